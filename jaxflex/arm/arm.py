@@ -1,0 +1,147 @@
+"""An arm: links, joints and payload in series, and the same arm with its constants computed."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from ..beam.basis import Distal
+from ..beam.link_model import LinkModel, rigid_link
+from ..effects import AbstractJointEffect
+from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
+from .parts import Joint, Link, Payload
+
+DRIVES = ("voltage", "current", "torque")
+
+
+class Arm(eqx.Module):
+    """A planar serial arm of flexible links, horizontal unless gravity is given.
+
+         joint 1     link 1     joint 2     link 2      payload
+        (J_h1,b1)==============(J_h2,M_h2)=============[M_p, I_p]
+           |  theta_1             theta_2
+          base                (relative to the tangent at the tip of link 1)
+
+    **Fields**
+
+    - `links`, `joints`: from base to tip; a joint without a link is a motor axis with
+      inertia only
+    - `payload`: at the tip
+    - `gravity` [m/s^2] along -y of the base; None for a horizontal arm
+    - `drive`: what the controller commands: `"voltage"`, `"current"` or `"torque"`
+    - `effects`: physics beyond the nominal arm, see `jaxflex.EFFECTS`
+
+    Deflections are small: the model is linear in the curvature of a link, exact in the
+    rotation of the joints.
+    """
+
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    payload: Payload = eqx.field(default_factory=Payload)
+    gravity: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    drive: str = eqx.field(static=True, default="torque")
+    effects: tuple[AbstractJointEffect, ...] = ()
+    name: str = eqx.field(static=True, default="arm")
+
+    def __check_init__(self):
+        if not self.joints:
+            raise ValueError("an arm needs at least one joint.")
+        if len(self.links) > len(self.joints):
+            raise ValueError(
+                f"an arm has a joint at the root of each link: {len(self.links)} links "
+                f"need as many joints, found {len(self.joints)}."
+            )
+        if self.drive not in DRIVES:
+            raise ValueError(f"drive = {self.drive!r} is unknown; allowed are {', '.join(DRIVES)}.")
+        if self.drive != "torque":
+            for number, joint in enumerate(self.joints, 1):
+                if joint.motor is None:
+                    raise ValueError(
+                        f"drive = {self.drive!r} needs a motor at every joint; joint {number} has "
+                        "none: give it one or set the drive to 'torque'."
+                    )
+        for effect in self.effects:
+            if effect.joint >= len(self.joints):
+                raise ValueError(
+                    f"effect {effect.name!r} is at {effect.location}, but the arm has "
+                    f"{len(self.joints)} joint(s)."
+                )
+
+    def with_payload(self, mass: ScalarLike, inertia: ScalarLike | None = None) -> "Arm":
+        """The same arm with another payload mass [kg] and, if given, inertia [kg m^2]."""
+        kept = self.payload.inertia if inertia is None else scalar(inertia)
+        payload = Payload(mass=scalar(mass), inertia=kept)
+        return eqx.tree_at(lambda arm: arm.payload, self, payload)
+
+    def distal(self, link: int) -> Distal:
+        """What hangs on link `link` with the arm stretched (Ahmad et al. (24)-(25), corrected).
+
+        The inertia is taken about the tip of the link; that of the last link is I_p
+        alone (the paper's (25) adds M_p l^2 to it).
+        """
+        mass, inertia, reach = scalar(0.0), scalar(0.0), scalar(0.0)
+        for joint, beyond in zip(self.joints[link + 1 :], self.links[link + 1 :], strict=False):
+            mass = mass + joint.hub_mass
+            inertia = inertia + joint.hub_inertia + joint.hub_mass * reach**2
+            centre = reach + beyond.length / 2
+            inertia = inertia + beyond.mass * (centre**2 + beyond.length**2 / 12)
+            mass = mass + beyond.mass
+            reach = reach + beyond.length
+        for joint in self.joints[max(link + 1, len(self.links)) :]:
+            mass = mass + joint.hub_mass
+            inertia = inertia + joint.hub_inertia + joint.hub_mass * reach**2
+        root = self.joints[link]
+        return Distal(
+            mass=mass + self.payload.mass,
+            inertia=inertia + self.payload.inertia + self.payload.mass * reach**2,
+            hub_inertia=root.hub_inertia + root.reflected_inertia,
+            root_stiffness=self.links[link].root_stiffness,
+        )
+
+    def assemble(self) -> "AssembledArm":
+        """The arm with every constant of its links computed, ready for the energies."""
+        models = []
+        for i in range(len(self.joints)):
+            if i < len(self.links):
+                models.append(self.links[i].discretise(self.distal(i), i + 1 < len(self.links)))
+            else:
+                models.append(rigid_link(scalar(0.0), scalar(0.0)))
+        return AssembledArm(self, tuple(models))
+
+
+class AssembledArm(eqx.Module):
+    """An arm and the constants of its links: all that the energies need.
+
+    Coordinates are `q = [theta_1 … theta_n, eta_11 …, eta_21 …]`, a tuple of scalars:
+    joint angles [rad], then the deflection coordinates [m] link by link.
+    """
+
+    arm: Arm
+    links: tuple[LinkModel, ...]
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints from base to tip."""
+        return self.arm.joints
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.links) + sum(link.shapes for link in self.links)
+
+    def split(self, q: tuple) -> tuple[tuple, list[tuple]]:
+        """Coordinates (or rates) as joint angles, and deflections link by link."""
+        n = len(self.links)
+        deflections, start = [], n
+        for link in self.links:
+            deflections.append(tuple(q[start : start + link.shapes]))
+            start += link.shapes
+        return tuple(q[:n]), deflections
+
+    def stiffness(self) -> tuple[Scalar, ...]:
+        """Stiffness of every coordinate: zero for the joints, K_k [N/m] for the links."""
+        zeros = (jnp.zeros_like(self.joints[0].hub_inertia),) * len(self.links)
+        return zeros + tuple(k for link in self.links for k in link.stiffness)
+
+    def damping(self) -> tuple[Scalar, ...]:
+        """Viscous damping of every coordinate: b [N m s/rad], then D_k [N s/m]."""
+        joints = tuple(joint.viscous_friction for joint in self.joints)
+        return joints + tuple(d for link in self.links for d in link.damping)

@@ -1,0 +1,65 @@
+"""Kinetic and potential energy: the two functions from which all dynamics follow."""
+
+import jax.numpy as jnp
+
+from ..scalars import Scalar, dot
+from .arm import AssembledArm
+from .kinematics import poses, velocities
+
+
+def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
+    """`T = T_R + T_L + T_PL` [J] (Ahmad et al. (6)-(8), (12), (13)).
+
+    A point of link i moves with `(u - omega w, v + omega x + w')` along the link's axes,
+    `(u, v)` and `omega` the velocity and rate of its frame; squared and integrated over
+    the link this leaves the constants of `LinkModel`. Added are the rotors at their
+    relative rate, the hub inertias at the absolute rate of the link they drive, the hub
+    masses at the joints, and the payload.
+
+    `q`, `qd`: tuples of `model.size` scalars.
+    """
+    frames, tips = velocities(model, q, qd)
+    rates, _ = model.split(qd)
+    _, etas = model.split(q)
+    _, eta_rates = model.split(qd)
+    twice = 0.0
+    for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
+        u, v, omega = frames[i]
+        eta, eta_rate = etas[i], eta_rates[i]
+        bent = dot(link.deflection_integral, eta)
+        bending = dot(link.deflection_integral, eta_rate)
+        spin = dot(link.rotation_integral, eta_rate)
+        twice = (
+            twice
+            + link.mass * (u * u + v * v)
+            + omega * omega * (link.second_moment + dot(eta, link.inertia_times(eta)))
+            + dot(eta_rate, link.inertia_times(eta_rate))
+            + 2 * (omega * (v * link.first_moment - u * bent + spin) + v * bending)
+        )
+        twice = twice + joint.hub_inertia * omega * omega
+        twice = twice + joint.reflected_inertia * rates[i] * rates[i]
+        if i > 0:
+            twice = twice + joint.hub_mass * (u * u + v * v)
+    payload, tip = model.arm.payload, tips[-1]
+    twice = twice + payload.mass * (tip.x * tip.x + tip.y * tip.y)
+    twice = twice + payload.inertia * tip.rate * tip.rate
+    return 0.5 * twice
+
+
+def potential_energy(model: AssembledArm, q: tuple) -> Scalar:
+    """`U` [J]: bending of the links (Ahmad et al. (14)), and gravity where there is any."""
+    _, etas = model.split(q)
+    energy = jnp.zeros_like(model.arm.payload.mass)
+    for link, eta in zip(model.links, etas, strict=True):
+        energy = energy + 0.5 * dot(link.stiffness, tuple(e * e for e in eta))
+    if model.arm.gravity is None:
+        return energy
+    frames, tips = poses(model, q)
+    moment = model.arm.payload.mass * tips[-1].y
+    for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
+        frame = frames[i]
+        c, s = jnp.cos(frame.heading), jnp.sin(frame.heading)
+        bent = dot(link.deflection_integral, etas[i])
+        moment = moment + (link.mass + joint.hub_mass) * frame.y
+        moment = moment + s * link.first_moment + c * bent
+    return energy + model.arm.gravity * moment

@@ -1,0 +1,139 @@
+"""The parts of an arm as an engineer describes them: links, joints, payload."""
+
+import equinox as eqx
+
+from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
+from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
+from ..motor import DCMotor
+from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
+
+
+def damping_ratios(value: "ScalarLike | str | tuple[ScalarLike, ...]") -> tuple[Scalar, ...] | str:
+    """Modal damping as a tuple of ratios, one a mode, or the word `"ahmad"`."""
+    if isinstance(value, str):
+        if value != "ahmad":
+            raise ValueError(f"damping must be ratios or 'ahmad', not {value!r}.")
+        return value
+    return tuple(scalar(v) for v in value) if isinstance(value, tuple) else (scalar(value),)
+
+
+class Link(eqx.Module):
+    """A slender uniform link that bends in the plane of motion (Ahmad et al., assumptions I-V).
+
+    **Fields**
+
+    - `length` [m], `mass_per_length` rho [kg/m], `flexural_rigidity` EI [N m^2]
+    - `damping_ratio`: modal damping ratio, a tuple with one a mode, or `"ahmad"` for
+      `D = 0.1 sqrt(K)`
+    - `modes`: number of mode shapes (0: a rigid link)
+    - `mode_shapes`: a key of `jaxflex.MODE_SHAPES`; the default is right whether the
+      joints are free, locked or controlled
+    - `model`: `"assumed_modes"` or `"lumped"`; `segments` of a lumped link
+    - `thickness` [m] in the plane of bending, needed for strain alone
+    - `gauge_position` [m] of the strain gauge from the root
+    - `root_stiffness` [N m/rad] of the `hinged_hub` shapes
+    """
+
+    length: Scalar = eqx.field(converter=scalar)
+    mass_per_length: Scalar = eqx.field(converter=scalar)
+    flexural_rigidity: Scalar = eqx.field(converter=scalar)
+    damping_ratio: tuple[Scalar, ...] | str = eqx.field(converter=damping_ratios, default=0.0)
+    modes: int = eqx.field(static=True, default=2)
+    mode_shapes: str = eqx.field(static=True, default="distal_mass_and_moment")
+    model: str = eqx.field(static=True, default="assumed_modes")
+    segments: int = eqx.field(static=True, default=20)
+    thickness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    gauge_position: Scalar = eqx.field(converter=scalar, default=0.0)
+    root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
+
+    def __check_init__(self):
+        if self.modes < 0:
+            raise ValueError(f"a link needs modes >= 0, found {self.modes}.")
+        if self.model not in ("assumed_modes", "lumped"):
+            raise ValueError(f"model = {self.model!r} is unknown; allowed are assumed_modes, lumped.")
+        if self.mode_shapes not in MODE_SHAPES:
+            allowed = ", ".join(MODE_SHAPES)
+            raise ValueError(f"mode_shapes = {self.mode_shapes!r} is unknown; allowed are {allowed}.")
+
+    @classmethod
+    def from_rectangle(
+        cls,
+        length: ScalarLike,
+        width: ScalarLike,
+        thickness: ScalarLike,
+        youngs_modulus: ScalarLike,
+        density: ScalarLike,
+        **options,
+    ) -> "Link":
+        """A link of rectangular section: `rho = density w h`, `EI = E w h^3 / 12`.
+
+        `width` [m] across the plane of bending, `thickness` h [m] in it,
+        `youngs_modulus` [Pa], `density` [kg/m^3]; `options` as for `Link`.
+        """
+        h = scalar(thickness)
+        return cls(
+            length=length,
+            mass_per_length=scalar(density) * scalar(width) * h,
+            flexural_rigidity=scalar(youngs_modulus) * scalar(width) * h**3 / 12,
+            thickness=h,
+            **options,
+        )
+
+    @property
+    def mass(self) -> Scalar:
+        """Mass of the link [kg]."""
+        return self.mass_per_length * self.length
+
+    def basis(self, distal: Distal, carries_link: bool) -> Basis:
+        """The deflection shapes of an assumed-modes link with `distal` at its ends."""
+        return make_basis(
+            self.mode_shapes, self.modes, self.length, self.mass_per_length,
+            self.flexural_rigidity, distal, carries_link,
+        )  # fmt: skip
+
+    def discretise(self, distal: Distal, carries_link: bool) -> LinkModel:
+        """The constants of the link, its shapes chosen for what hangs on it."""
+        if self.modes == 0:
+            return rigid_link(self.length, self.mass)
+        if self.model == "lumped":
+            return lumped_link(
+                self.length, self.mass_per_length, self.flexural_rigidity,
+                self.damping_ratio, self.gauge_position, self.segments, None, distal.mass,
+            )  # fmt: skip
+        return assumed_modes_link(
+            self.basis(distal, carries_link), self.mass_per_length,
+            self.flexural_rigidity, self.damping_ratio, self.gauge_position,
+        )  # fmt: skip
+
+
+class Joint(eqx.Module):
+    """A revolute joint and what turns with it.
+
+    **Fields** (shape `()`)
+
+    - `hub_inertia` J_h [kg m^2], turning at the absolute rate of the link it drives
+    - `hub_mass` M_h [kg] at the joint, carried by the link before it
+    - `viscous_friction` b [N m s/rad] on the joint's rate
+    - `rotor_inertia` I_r [kg m^2], turning at the gear ratio times the joint's rate
+      (Ahmad et al. (7))
+    - `motor`: a `DCMotor`, or None for a joint driven by a torque
+    """
+
+    hub_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
+    hub_mass: Scalar = eqx.field(converter=scalar, default=0.0)
+    viscous_friction: Scalar = eqx.field(converter=scalar, default=0.0)
+    rotor_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
+    motor: DCMotor | None = None
+
+    @property
+    def reflected_inertia(self) -> Scalar:
+        """`G^2 I_r` [kg m^2]: the rotor as the joint feels it."""
+        ratio = scalar(1.0) if self.motor is None else self.motor.gear_ratio
+        return ratio**2 * self.rotor_inertia
+
+
+class Payload(eqx.Module):
+    """A rigid body at the tip: `mass` M_p [kg], `inertia` I_p [kg m^2] about the tip."""
+
+    mass: Scalar = eqx.field(converter=scalar, default=0.0)
+    inertia: Scalar = eqx.field(converter=scalar, default=0.0)

@@ -1,0 +1,177 @@
+"""A link seen from the arm: the constants that its deflection shapes leave behind.
+
+Once the shapes are chosen, a link enters the energies only through a handful of
+integrals. They are computed once for an arm, never inside the equations of motion. The assumed-modes link and the
+lumped-parameter link differ in nothing but how they arrive at these numbers.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..scalars import Scalar, dot
+from .basis import Basis, orthogonalise, quadrature
+
+
+class LinkModel(eqx.Module):
+    """Inertia, stiffness and damping of a link with deflection `w = sum psi_k(x) eta_k`.
+
+    **Fields** (scalars, or tuples of them over the shapes k):
+
+    - `length` [m]
+    - `mass` `int rho dx` [kg], `first_moment` `int rho x dx` [kg m],
+      `second_moment` `int rho x^2 dx` [kg m^2]
+    - `deflection_integral` `int rho psi_k dx` [kg]
+    - `rotation_integral` `int rho x psi_k dx` [kg m]
+    - `modal_inertia` `int rho psi_j psi_k dx` [kg], a tuple of rows
+    - `stiffness` `int EI psi_k'' psi_k'' dx` [N/m]; `damping` [N s/m]
+    - `tip_deflection` `psi_k(l)`; `tip_slope` `psi_k'(l)` [1/m];
+      `gauge_curvature` `psi_k''` at the strain gauge [1/m^2]
+    """
+
+    length: Scalar
+    mass: Scalar
+    first_moment: Scalar
+    second_moment: Scalar
+    deflection_integral: tuple[Scalar, ...]
+    rotation_integral: tuple[Scalar, ...]
+    modal_inertia: tuple[tuple[Scalar, ...], ...]
+    stiffness: tuple[Scalar, ...]
+    damping: tuple[Scalar, ...]
+    tip_deflection: tuple[Scalar, ...]
+    tip_slope: tuple[Scalar, ...]
+    gauge_curvature: tuple[Scalar, ...]
+
+    @property
+    def shapes(self) -> int:
+        """Number of deflection coordinates of the link."""
+        return len(self.stiffness)
+
+    def inertia_times(self, rates: tuple) -> tuple:
+        """`int rho psi psi^T dx` times a tuple of modal quantities."""
+        return tuple(dot(row, rates) for row in self.modal_inertia)
+
+
+def rigid_link(length: Scalar, mass: Scalar) -> LinkModel:
+    """A uniform link that does not bend (the limit of rising stiffness)."""
+    none: tuple[Scalar, ...] = ()
+    return LinkModel(
+        length, mass, mass * length / 2, mass * length**2 / 3,
+        none, none, (), none, none, none, none, none,
+    )  # fmt: skip
+
+
+def modal_damping(
+    stiffness: Sequence[Scalar],
+    modal_mass: Scalar,
+    damping_ratio: tuple[Scalar, ...] | str,
+) -> tuple[Scalar, ...]:
+    """Damping coefficients D_k [N s/m] of the modal coordinates.
+
+    `2 zeta_k sqrt(K_k m)` for damping ratios (the last one given serves the higher
+    modes), or `0.1 sqrt(K_k)` for `"ahmad"` (Ahmad et al., below (27)).
+    """
+    if damping_ratio == "ahmad":
+        return tuple(0.1 * jnp.sqrt(k) for k in stiffness)
+    ratios = tuple(damping_ratio[min(j, len(damping_ratio) - 1)] for j in range(len(stiffness)))
+    return tuple(2 * z * jnp.sqrt(k * modal_mass) for z, k in zip(ratios, stiffness, strict=True))  # type: ignore[operator]
+
+
+def assumed_modes_link(
+    basis: Basis,
+    mass_per_length: Scalar,
+    flexural_rigidity: Scalar,
+    damping_ratio: tuple[Scalar, ...] | str,
+    gauge_position: Scalar,
+) -> LinkModel:
+    """The link whose deflection is a sum over `basis` (Ahmad et al. (19), Foldager et al. (8))."""
+    length = basis.modes.length
+    points, weights = quadrature(length)
+    psi = jax.vmap(basis.deflection)(points)
+    bend = jax.vmap(basis.curvature)(points)
+    rho = mass_per_length * weights
+    mass = mass_per_length * length
+    stiffness = tuple(jnp.sum(flexural_rigidity * weights[:, None] * bend**2, axis=0))
+    return LinkModel(
+        length=length,
+        mass=mass,
+        first_moment=mass * length / 2,
+        second_moment=mass * length**2 / 3,
+        deflection_integral=tuple(rho @ psi),
+        rotation_integral=tuple((rho * points) @ psi),
+        modal_inertia=_rows((psi.T * rho) @ psi),
+        stiffness=stiffness,
+        damping=modal_damping(stiffness, mass, damping_ratio),
+        tip_deflection=tuple(basis.deflection(length)),
+        tip_slope=tuple(basis.slope(length)),
+        gauge_curvature=tuple(basis.curvature(gauge_position)),
+    )
+
+
+def _rows(matrix: Float[Array, "shapes shapes"]) -> tuple[tuple[Scalar, ...], ...]:
+    return tuple(tuple(row) for row in matrix)
+
+
+def lumped_link(
+    length: Scalar,
+    mass_per_length: Scalar,
+    flexural_rigidity: Scalar,
+    damping_ratio: tuple[Scalar, ...] | str,
+    gauge_position: Scalar,
+    segments: int,
+    modes: int | None,
+    tip_mass: Scalar,
+) -> LinkModel:
+    """The lumped-parameter link of Foldager et al. (section 4): masses on massless springs.
+
+    The link is cut into `segments` equal parts, each with its mass at its middle; a
+    torsion spring `EI / h` joins one part to the next, and half a part, `2 EI / h`,
+    joins the first to the root. The springs' angles are the physical coordinates; they
+    are turned into the modes of the clamped chain with `tip_mass` [kg] at its end (all
+    of them, or the `modes` lowest), an exact change of coordinates that makes stiffness
+    and damping diagonal. Hub inertia, and the root spring that stands for a controller,
+    belong to the joint.
+
+    **Raises** `ValueError` if there are fewer segments than modes.
+    """
+    if modes is not None and modes > segments:
+        raise ValueError(
+            f"a lumped link with segments = {segments} has no more than {segments} modes, "
+            f"{modes} were asked for; raise segments or lower modes."
+        )
+    h = length / segments
+    index = jnp.arange(segments)
+    middle = (index + 0.5) * h
+    # spring j sits at x = j h; a unit angle there lifts all that lies beyond it
+    lift = jnp.maximum(middle[:, None] - index[None, :] * h, 0.0)
+    tip_lift = length - index * h
+    mass = mass_per_length * length
+    point_mass = mass / segments
+    springs = jnp.where(index == 0, 2.0, 1.0) * flexural_rigidity / h
+    inertia = point_mass * lift.T @ lift
+    mixing = orthogonalise(inertia + tip_mass * jnp.outer(tip_lift, tip_lift), jnp.diag(springs), mass)
+    mixing = mixing[:, :modes]
+    mixing = mixing * jnp.where(tip_lift @ mixing < 0, -1.0, 1.0)
+    psi = lift @ mixing
+    stiffness = tuple(springs @ mixing**2)
+    # curvature at the gauge: the angle of its spring spread over the length that it stands for
+    bends = mixing / jnp.where(index == 0, h / 2, h)[:, None]
+    stations = jnp.where(index == 0, h / 4, index * h)
+    gauge = jax.vmap(lambda column: jnp.interp(gauge_position, stations, column), 1)(bends)
+    return LinkModel(
+        length=length,
+        mass=mass,
+        first_moment=mass * length / 2,
+        second_moment=point_mass * jnp.sum(middle**2),
+        deflection_integral=tuple(point_mass * psi.sum(axis=0)),
+        rotation_integral=tuple(point_mass * middle @ psi),
+        modal_inertia=_rows(point_mass * psi.T @ psi),
+        stiffness=stiffness,
+        damping=modal_damping(stiffness, mass, damping_ratio),
+        tip_deflection=tuple(tip_lift @ mixing),
+        tip_slope=tuple(mixing.sum(axis=0)),
+        gauge_curvature=tuple(gauge),
+    )

@@ -1,0 +1,1 @@
+"""The equations of motion, derived from the energies by autodiff."""

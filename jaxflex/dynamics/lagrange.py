@@ -1,0 +1,78 @@
+"""M, C and g by autodiff of `T - U` (Ahmad et al. (26)-(27)).
+
+Two faces of one derivation. Over arrays, `mass_matrix`, `coriolis_matrix` and
+`gravity_vector` are the textbook terms of `M q'' + C q' + g + D q' = tau`, for reading,
+design and tests. Over scalars, `accelerations` is what the simulation calls: the same
+derivatives without an array in sight, so that XLA fuses them and a batch of arms
+becomes a struct of arrays.
+"""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..arm.arm import AssembledArm
+from ..arm.energy import kinetic_energy, potential_energy
+from ..scalars import Scalar
+from .ldl import solve
+
+Coordinates = Float[Array, " coordinates"]
+Matrix = Float[Array, "coordinates coordinates"]
+
+
+def lagrangian(model: AssembledArm, q: Coordinates, qd: Coordinates) -> Scalar:
+    """`L = T - U` [J]."""
+    return kinetic_energy(model, tuple(q), tuple(qd)) - potential_energy(model, tuple(q))
+
+
+def mass_matrix(model: AssembledArm, q: Coordinates) -> Matrix:
+    """`M = d^2 T / dq'^2`, symmetric positive definite, shape `(n, n)`."""
+    return jax.hessian(lagrangian, argnums=2)(model, q, jnp.zeros_like(q))
+
+
+def coriolis_matrix(model: AssembledArm, q: Coordinates, qd: Coordinates) -> Matrix:
+    """`C_ij = sum_k 1/2 (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) q'_k`, shape `(n, n)`.
+
+    Christoffel symbols of the first kind, which make `dM/dt - 2 C` skew.
+    """
+    slope = jax.jacfwd(mass_matrix, argnums=1)(model, q)  # slope[i, j, k] = dM_ij / dq_k
+    return 0.5 * (
+        slope @ qd + jnp.einsum("ikj,k->ij", slope, qd) - jnp.einsum("jki,k->ij", slope, qd)
+    )
+
+
+def gravity_vector(model: AssembledArm, q: Coordinates) -> Coordinates:
+    """`g = dU/dq`: gravity and the links' stiffness, shape `(n,)`."""
+    return jax.grad(lambda q: potential_energy(model, tuple(q)))(q)
+
+
+def damping_vector(model: AssembledArm) -> Coordinates:
+    """Diagonal of D: viscous friction of the joints, modal damping of the links, shape `(n,)`."""
+    return jnp.stack(model.damping())
+
+
+@jax.jit
+def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
+    """`q'' = M^-1 (force - bias)`, all tuples of scalars.
+
+    The bias `d/dt(dL/dq')|_{q''=0} - dL/dq` holds Coriolis, centrifugal, gravity and
+    elastic terms; `force` everything else (damping, friction, motors, disturbances).
+    """
+
+    def momentum(q, qd):
+        return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
+
+    size = len(q)
+    columns = []
+    for j in range(size):
+        # differentiating along one rate at a time lets autodiff drop all that does not
+        # depend on it, which a vmap over unit vectors could not
+        def along(rate, j=j):
+            return momentum(q, (*qd[:j], rate, *qd[j + 1 :]))
+
+        columns.append(jax.jvp(along, (qd[j],), (jnp.ones_like(qd[j]),))[1])
+    lower = [[columns[j][i] for j in range(i + 1)] for i in range(size)]
+    drift = jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))[1]
+    slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
+    right = tuple(f - d + s for f, d, s in zip(force, drift, slope, strict=True))
+    return solve(lower, right)

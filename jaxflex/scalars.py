@@ -1,0 +1,30 @@
+"""Scalars: the one type that every parameter of a model has."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+Scalar = Float[Array, ""]
+ScalarLike = float | int | np.number | Float[Array, ""] | Int[Array, ""] | Float[np.ndarray, ""]
+
+
+def scalar(value: ScalarLike) -> Scalar:
+    """`value` as a strongly typed floating-point scalar of the precision in force.
+
+    Python numbers become weakly typed arrays in JAX, and a weakly typed argument
+    compiles a function anew; fixing the type here keeps one compilation for all.
+    """
+    return jnp.asarray(value, dtype=jnp.result_type(float))
+
+
+def optional_scalar(value: ScalarLike | None) -> Scalar | None:
+    """`scalar(value)`, or None where the value is absent."""
+    return None if value is None else scalar(value)
+
+
+def dot(a: tuple, b: tuple) -> Scalar | float:
+    """Sum of products of two tuples of scalars, in the form XLA fuses (no arrays)."""
+    total = 0.0
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total
