@@ -1,0 +1,90 @@
+"""What the simulation asks of a controller and of the reference it follows."""
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from .scalars import Scalar
+
+
+class Setpoint(NamedTuple):
+    """Reference of every joint: tuples of scalars [rad], [rad/s], [rad/s^2].
+
+    Where the reference is a torque, current or voltage profile, `value` is that profile.
+    """
+
+    value: tuple
+    rate: tuple
+    acceleration: tuple
+
+
+class Measurement(NamedTuple):
+    """What a controller may read, tuples of scalars joint by joint or link by link.
+
+    `angle` [rad], `rate` [rad/s] of the joints; `current` [A] of the motors;
+    `tip_deflection` [m] and `curvature` [1/m] at the strain gauge of the links, with
+    `curvature_rate` [1/(m s)].
+    """
+
+    angle: tuple
+    rate: tuple
+    current: tuple
+    tip_deflection: tuple
+    curvature: tuple
+    curvature_rate: tuple
+
+
+class AbstractReference(eqx.Module):
+    """A signal for every joint as a function of time, differentiable in its parameters."""
+
+    @abstractmethod
+    def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
+        """Value of the signal for every joint at time `t` [s]."""
+
+    @abstractmethod
+    def jumps(self) -> Float[Array, " jumps"]:
+        """Times [s] at which the signal or its derivatives jump; the solver steps to them."""
+
+    @abstractmethod
+    def end(self) -> Scalar:
+        """Time [s] at which the commanded move is over and the signal stays constant."""
+
+    def setpoint(self, t: Scalar) -> Setpoint:
+        """Value, rate and acceleration at `t` [s]: the derivatives by autodiff in time."""
+        one = jnp.ones_like(t)
+
+        def with_rate(t):
+            return jax.jvp(self, (t,), (one,))
+
+        (value, rate), (_, acceleration) = jax.jvp(with_rate, (t,), (one,))
+        return Setpoint(value, rate, acceleration)
+
+
+class AbstractController(eqx.Module):
+    """A control law: measurement and setpoint in, one command for every joint out.
+
+    The command is a voltage [V], current [A] or torque [N m], as the arm's drive says.
+    A controller with memory keeps it in a pytree of scalars, a part of the simulated
+    state: `rate` is its time derivative, integrated by the solver under continuous
+    control and by one Euler step a sample under sampled control.
+    """
+
+    @abstractmethod
+    def initial(self) -> PyTree:
+        """Memory at the start; None for a law without memory."""
+
+    @abstractmethod
+    def command(
+        self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
+    ) -> tuple[Scalar, ...]:
+        """Command for every joint at time `t` [s]."""
+
+    @abstractmethod
+    def rate(
+        self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
+    ) -> PyTree:
+        """Time derivative of the memory, of the same structure."""

@@ -1,0 +1,79 @@
+"""From a command to a torque at every joint: motors, amplifiers, friction and effects."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from .arm.arm import AssembledArm
+from .scalars import Scalar
+
+
+class DriveState(NamedTuple):
+    """What the drives do at an instant, tuples over the joints.
+
+    `voltage` [V] at the winding (zero where there is no motor), `current` [A],
+    `torque` [N m] of the motor at the joint, `current_rate` [A/s] of the motors whose
+    current is a state.
+    """
+
+    voltage: tuple
+    current: tuple
+    torque: tuple
+    current_rate: tuple
+
+
+def has_current_state(model: AssembledArm, joint: int) -> bool:
+    """True if the joint's current is a state: a voltage drive and a motor with inductance."""
+    motor = model.joints[joint].motor
+    return model.arm.drive == "voltage" and motor is not None and motor.inductance is not None
+
+
+def initial_currents(model: AssembledArm) -> tuple[Scalar, ...]:
+    """Zero current [A] for every motor whose current is a state."""
+    zero = jnp.zeros_like(model.arm.payload.mass)
+    return tuple(zero for i in range(len(model.joints)) if has_current_state(model, i))
+
+
+def drive(model: AssembledArm, command: tuple, currents: tuple, rates: tuple) -> DriveState:
+    """Voltages, currents and torques that follow from `command` (Foldager et al. (1)-(3)).
+
+    `currents` are those that are states; `rates` [rad/s] those of the joints. A voltage
+    command is limited to the amplifier's range; a current or torque command is given as
+    it is, and the voltage it takes is reported where there is a motor to tell.
+    """
+    voltages, all_currents, torques, current_rates = [], [], [], []
+    states = iter(currents)
+    for i, joint in enumerate(model.joints):
+        motor, asked, rate = joint.motor, command[i], rates[i]
+        zero = jnp.zeros_like(asked)
+        if model.arm.drive == "torque" or motor is None:
+            voltage, current, torque = zero, zero, asked
+            if motor is not None:
+                current = asked / motor.joint_torque(jnp.ones_like(asked))
+                emf = -motor.armature_voltage(zero, rate)
+                voltage = motor.resistance * current + emf
+        elif model.arm.drive == "current":
+            current = asked
+            voltage = motor.resistance * current - motor.armature_voltage(zero, rate)
+            torque = motor.joint_torque(current)
+        else:
+            voltage = motor.limited(asked)
+            if has_current_state(model, i):
+                current = next(states)
+                current_rates.append(motor.current_rate(current, voltage, rate))
+            else:
+                current = motor.static_current(voltage, rate)
+            torque = motor.joint_torque(current)
+        voltages.append(voltage)
+        all_currents.append(current)
+        torques.append(torque)
+    return DriveState(tuple(voltages), tuple(all_currents), tuple(torques), tuple(current_rates))
+
+
+def effect_torques(model: AssembledArm, angles: tuple, rates: tuple) -> tuple[Scalar, ...]:
+    """Sum of the arm's effects at every joint [N m]."""
+    torques = [jnp.zeros_like(rate) for rate in rates]
+    for effect in model.arm.effects:
+        i = effect.joint
+        torques[i] = torques[i] + effect(angles[i], rates[i])
+    return tuple(torques)

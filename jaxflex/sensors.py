@@ -1,0 +1,131 @@
+"""What instruments on the arm read: the ideal channels, and the instruments' faults."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from .arm.arm import AssembledArm
+from .arm.kinematics import poses, velocities
+from .drive import DriveState
+from .scalars import Scalar, dot, optional_scalar, scalar
+
+UNITS = {
+    "time": "s",
+    "voltage": "V",
+    "current": "A",
+    "torque": "N m",
+    "angle": "rad",
+    "rate": "rad/s",
+    "reference": "rad",
+    "tip_deflection": "m",
+    "strain": "1",
+    "tip_acceleration": "m/s^2",
+    "tip_x": "m",
+    "tip_y": "m",
+}
+
+
+def unit(channel: str) -> str:
+    """Unit of a channel such as `angle_1` or `tip_x`; raises `KeyError` for an unknown one."""
+    if channel in UNITS:
+        return UNITS[channel]
+    return UNITS[channel.rpartition("_")[0]]
+
+
+def read_channels(
+    model: AssembledArm, q: tuple, qd: tuple, qdd: tuple, drives: DriveState
+) -> dict[str, Scalar]:
+    """Every channel of the arm at an instant, without error.
+
+    - `angle_i` [rad] encoder, `rate_i` [rad/s] tachometer, `torque_i` [N m] of the motor
+    - `voltage_i` [V], `current_i` [A] where joint i has a motor
+    - `tip_deflection_i` [m] of link i from its own tangent at the root
+    - `strain_i` at the gauge, `h/2 w''`, where the thickness of link i is known
+    - `tip_acceleration_i` [m/s^2], across link i, of its tip in the inertial frame
+    - `tip_x`, `tip_y` [m] of the payload in the base frame
+    """
+    angles, etas = model.split(q)
+    rates, _ = model.split(qd)
+    channels: dict[str, Scalar] = {}
+    for i, joint in enumerate(model.joints):
+        number = i + 1
+        channels[f"angle_{number}"] = angles[i]
+        channels[f"rate_{number}"] = rates[i]
+        channels[f"torque_{number}"] = drives.torque[i]
+        if joint.motor is not None:
+            channels[f"voltage_{number}"] = drives.voltage[i]
+            channels[f"current_{number}"] = drives.current[i]
+
+    def motion(q, qd):
+        return velocities(model, q, qd)
+
+    (frames, tips), (_, tip_slopes) = jax.jvp(motion, (q, qd), (qd, qdd))
+    for i, link in enumerate(model.arm.links):
+        number, constants = i + 1, model.links[i]
+        channels[f"tip_deflection_{number}"] = dot(constants.tip_deflection, etas[i]) + 0 * angles[0]
+        if link.thickness is not None:
+            curvature = dot(constants.gauge_curvature, etas[i])
+            channels[f"strain_{number}"] = link.thickness / 2 * curvature
+        channels[f"tip_acceleration_{number}"] = tip_slopes[i].y + frames[i].rate * tips[i].x
+    end = poses(model, q)[1][-1]
+    channels["tip_x"] = end.x + 0 * angles[0]
+    channels["tip_y"] = end.y + 0 * angles[0]
+    return channels
+
+
+class Sensor(eqx.Module):
+    """An instrument with its faults: `gain * lagged(signal) + bias + noise`, then rounded.
+
+    **Fields**: `gain` [1], `bias` [unit of the channel], `lag` [s] of first order,
+    `noise` standard deviation [unit], `resolution` [unit] of one count (None: none). An
+    encoder of N counts a turn has `resolution = 2 pi / N`.
+    """
+
+    gain: Scalar = eqx.field(converter=scalar, default=1.0)
+    bias: Scalar = eqx.field(converter=scalar, default=0.0)
+    lag: Scalar = eqx.field(converter=scalar, default=0.0)
+    noise: Scalar = eqx.field(converter=scalar, default=0.0)
+    resolution: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    def read(
+        self,
+        times: Float[Array, " times"],
+        signal: Float[Array, " times"],
+        key: PRNGKeyArray | None = None,
+    ) -> Float[Array, " times"]:
+        """What the instrument shows of `signal` at `times` [s]; without a `key`, no noise.
+
+        Rounding to counts passes the gradient through unchanged.
+        """
+        reading = self.gain * first_order_lag(times, signal, self.lag) + self.bias
+        if key is not None:
+            reading = reading + self.noise * jax.random.normal(key, signal.shape, signal.dtype)
+        if self.resolution is None:
+            return reading
+        rounded = jnp.round(reading / self.resolution) * self.resolution
+        return reading + jax.lax.stop_gradient(rounded - reading)
+
+
+def first_order_lag(
+    times: Float[Array, " times"], signal: Float[Array, " times"], lag: Scalar
+) -> Float[Array, " times"]:
+    """`lag y' + y = signal`, exact for a signal that is straight between its samples.
+
+    Starts in balance with the first sample. Differentiable at `lag = 0`, where it is
+    the signal itself.
+    """
+    some = lag > 0
+    safe = jnp.where(some, lag, 1.0)
+    steps = jnp.diff(times)
+    decay = jnp.where(some, jnp.exp(-steps / safe), 0.0)
+    # y1 = decay y0 + (mean - decay) u0 + (1 - mean) u1, with mean = (1 - decay) lag / step
+    mean = jnp.where(some, 1 - decay, 1.0) * lag / steps
+
+    def step(y, inputs):
+        a, m, u0, u1 = inputs
+        y = a * y + (m - a) * u0 + (1 - m) * u1
+        return y, y
+
+    _, tail = jax.lax.scan(step, signal[0], (decay, mean, signal[:-1], signal[1:]))
+    return jnp.concatenate([signal[:1], tail])

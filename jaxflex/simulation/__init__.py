@@ -1,0 +1,1 @@
+"""Simulation: an arm, a controller and a reference, integrated by diffrax."""

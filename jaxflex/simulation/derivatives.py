@@ -1,0 +1,69 @@
+"""One function, differentiated forwards by one implementation and backwards by another.
+
+A loop that stops when it is done can be differentiated forwards as it is, and
+backwards only with checkpoints; JAX's loops support one or the other. The derivative is
+the same linear map either way, so both can serve one function: its push-forward through
+the first, its transpose through the second.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+
+def both_modes(forward: Callable[[PyTree], PyTree], reverse: Callable[[PyTree], PyTree]):
+    """`x -> forward(x)`, with `jvp` through `forward` and `vjp` through `reverse`.
+
+    Both must compute the same function of a pytree, `forward` being forward- and
+    `reverse` reverse-differentiable. Only the leaves that are being differentiated get
+    tangents. Differentiating twice is refused with an error.
+
+    The pair is handed to JAX as a linear solve with the identity, the one public
+    operation that takes a linear map together with its transpose.
+    """
+
+    @eqx.filter_custom_jvp
+    def call(x):
+        return forward(x)
+
+    @call.def_jvp
+    def _(primals, tangents):
+        (x,), (tangent,) = primals, tangents
+        out = call(x)
+        x = eqxi.nondifferentiable(x, name="The derivative of `simulate`")
+        active = jtu.tree_map(lambda t, v: None if t is None else v, tangent, x, is_leaf=_is_none)
+        rest = jtu.tree_map(lambda t, v: v if t is None else None, tangent, x, is_leaf=_is_none)
+
+        def through(function, a):
+            return eqx.filter(function(eqx.combine(a, rest)), eqx.is_inexact_array)
+
+        blank = jtu.tree_map(jnp.zeros_like, eqx.filter(out, eqx.is_inexact_array))
+        guard = jtu.tree_leaves(active)[0]
+
+        def identity(b):
+            # the guard makes a second derivative meet `nondifferentiable` instead of zero
+            return jtu.tree_map(lambda leaf: leaf + 0 * jnp.sum(guard), b)
+
+        def push(_, b):
+            t, _ = b
+            _, pushed = jax.jvp(lambda a: through(forward, a), (active,), (t,))
+            return jtu.tree_map(jnp.zeros_like, t), pushed
+
+        def pull(_, b):
+            t, cotangent = b
+            _, vjp = jax.vjp(lambda a: through(reverse, a), active)
+            return vjp(cotangent)[0], jtu.tree_map(jnp.zeros_like, cotangent)
+
+        _, pushed = jax.lax.custom_linear_solve(identity, (tangent, blank), push, pull)
+        return out, pushed
+
+    return call
+
+
+def _is_none(leaf) -> bool:
+    return leaf is None

@@ -1,0 +1,202 @@
+"""How a simulation steps: adaptive, fixed step, and the sample-and-hold that wraps either."""
+
+from abc import abstractmethod
+
+import diffrax
+import equinox as eqx
+import equinox.internal as eqxi
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import Array, Bool, Float
+
+from ..scalars import Scalar, scalar
+from .plant import Plant, State
+
+SMALLEST_STEP = 1e-10  # s; an adaptive solve that asks for less has failed
+INSTANT_SLACK = 1e-6  # share of a period within which two instants count as one
+
+
+class AbstractMethod(eqx.Module):
+    """A solver and how it chooses its steps."""
+
+    solver: eqx.AbstractVar[diffrax.AbstractSolver]
+
+    @abstractmethod
+    def controller(
+        self, jumps: Float[Array, " jumps"], start: Scalar, period: Scalar | None
+    ) -> diffrax.AbstractStepSizeController:
+        """Step-size control that steps to all of `jumps` [s], and to every `period` [s] from `start`."""
+
+    @abstractmethod
+    def first_step(self) -> Scalar | None:
+        """Size of the first step [s], or None to let the solver choose."""
+
+
+class Adaptive(AbstractMethod):
+    """Steps chosen for an error of `rtol` relative and `atol` absolute in every state.
+
+    The default solver, `diffrax.Tsit5`, suits arms whose fastest mode matters; give
+    `diffrax.Kvaerno5()` for stiff ones (many modes, stiff joints, small inductance).
+    """
+
+    rtol: float = eqx.field(static=True, default=1e-6)
+    atol: float = eqx.field(static=True, default=1e-8)
+    solver: diffrax.AbstractSolver = diffrax.Tsit5()
+
+    def controller(
+        self, jumps: Float[Array, " jumps"], start: Scalar, period: Scalar | None
+    ) -> diffrax.AbstractStepSizeController:
+        """A PI controller clipped to the jumps and the sample instants."""
+        pid = diffrax.PIDController(
+            rtol=self.rtol, atol=self.atol, pcoeff=0.2, icoeff=0.5, dtmin=SMALLEST_STEP
+        )
+        clipped = diffrax.ClipStepSizeController(pid, jump_ts=jumps)
+        return clipped if period is None else _ClipToSamples(clipped, start, period)
+
+    def first_step(self) -> Scalar | None:
+        """Chosen by the solver."""
+        return None
+
+
+class Fixed(AbstractMethod):
+    """Steps of `dt` [s], cut short only to land on every jump and sample instant.
+
+    `diffrax.Tsit5` by default; any other solver of diffrax will do.
+    """
+
+    dt: Scalar = eqx.field(converter=scalar)
+    solver: diffrax.AbstractSolver = diffrax.Tsit5()
+
+    def controller(
+        self, jumps: Float[Array, " jumps"], start: Scalar, period: Scalar | None
+    ) -> diffrax.AbstractStepSizeController:
+        """A grid of `dt` that also holds the jumps and the sample instants."""
+        return _GridSteps(jnp.sort(jumps), start, period)
+
+    def first_step(self) -> Scalar | None:
+        """`dt` [s]."""
+        return self.dt
+
+
+def next_instant(t: Scalar, start: Scalar, period: Scalar) -> Scalar:
+    """The first of `start + k period` after `t`, a hair of slack keeping it from being `t` itself."""
+    return start + (jnp.floor((t - start) / period + INSTANT_SLACK) + 1) * period
+
+
+def at_instant(t: Scalar, start: Scalar, period: Scalar) -> Bool[Array, ""]:
+    """True where `t` is one of `start + k period`, to rounding."""
+    periods = (t - start) / period
+    return jnp.abs(periods - jnp.round(periods)) < INSTANT_SLACK
+
+
+class _GridSteps(diffrax.AbstractStepSizeController):
+    """Steps to the next point of a uniform grid, to just before a jump, or to a sample instant."""
+
+    jumps: Float[Array, " jumps"]
+    start: Scalar
+    period: Scalar | None
+
+    def wrap(self, direction):
+        return self
+
+    def init(self, terms, t0, t1, y0, dt0, args, func, error_order):
+        del terms, t1, y0, args, func, error_order
+        return self._next(t0, dt0), dt0
+
+    def _next(self, t, dt):
+        ahead = jnp.where(self.jumps > t + INSTANT_SLACK * dt, self.jumps, jnp.inf)
+        jump = jnp.min(ahead, initial=jnp.inf)
+        t1 = jnp.minimum(next_instant(t, self.start, dt), eqxi.prevbefore(jump))
+        return t1 if self.period is None else jnp.minimum(t1, next_instant(t, self.start, self.period))
+
+    def adapt_step_size(self, t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state):
+        del t0, y0, y1_candidate, args, y_error, error_order
+        after = eqxi.nextafter(t1)
+        jumped = jnp.any(after == self.jumps)
+        t0 = jnp.where(jumped, eqxi.nextafter(after), t1)
+        if self.period is not None:
+            jumped = jumped | at_instant(t0, self.start, self.period)
+        result = diffrax.RESULTS.successful
+        return True, t0, self._next(t0, controller_state), jumped, controller_state, result
+
+
+class _ClipToSamples(diffrax.AbstractAdaptiveStepSizeController):
+    """Another step-size controller, clipped to land on every sample instant."""
+
+    inner: diffrax.AbstractAdaptiveStepSizeController
+    start: Scalar
+    period: Scalar
+
+    @property
+    def rtol(self):
+        return self.inner.rtol
+
+    @property
+    def atol(self):
+        return self.inner.atol
+
+    @property
+    def norm(self):  # pyright: ignore
+        return self.inner.norm
+
+    def wrap(self, direction):
+        return _ClipToSamples(self.inner.wrap(direction), self.start, self.period)  # pyright: ignore
+
+    def init(self, terms, t0, t1, y0, dt0, args, func, error_order):
+        t1, state = self.inner.init(terms, t0, t1, y0, dt0, args, func, error_order)
+        return jnp.minimum(t1, next_instant(t0, self.start, self.period)), state
+
+    def adapt_step_size(self, t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state):
+        keep, t0, t1, jumped, state, result = self.inner.adapt_step_size(
+            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
+        )
+        t1 = jnp.minimum(t1, next_instant(t0, self.start, self.period))
+        return keep, t0, t1, jumped | at_instant(t0, self.start, self.period), state, result
+
+
+class SampleAndHold(diffrax.AbstractWrappedSolver):
+    """A solver that samples the controller at the start of every period and holds its command.
+
+    A step that begins at a sample instant first replaces the held command; the step-size
+    controller makes sure that steps do begin there.
+    """
+
+    solver: diffrax.AbstractSolver
+    start: Scalar
+
+    @property
+    def term_structure(self):
+        return self.solver.term_structure
+
+    @property
+    def interpolation_cls(self):  # pyright: ignore
+        return self.solver.interpolation_cls
+
+    @property
+    def term_compatible_contr_kwargs(self):
+        return self.solver.term_compatible_contr_kwargs
+
+    def order(self, terms):
+        return self.solver.order(terms)
+
+    def error_order(self, terms):
+        return self.solver.error_order(terms)
+
+    def init(self, terms, t0, t1, y0, args):
+        return self.solver.init(terms, t0, t1, y0, args)
+
+    def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
+        y0 = sample(args, self.start, t0, y0)
+        return self.solver.step(terms, t0, t1, y0, args, solver_state, made_jump)
+
+    def func(self, terms, t0, y0, args):
+        return self.solver.func(terms, t0, y0, args)
+
+
+def sample(plant: Plant, start: Scalar, t: Scalar, state: State) -> State:
+    """`state` with its command held anew if `t` is a sample instant; as it is under continuous control."""
+    if plant.sample_time is None:
+        return state
+    fresh = at_instant(t, start, plant.sample_time)
+    after = plant.sampled(t, state)
+    return jtu.tree_map(lambda a, b: jnp.where(fresh, a, b), after, state)

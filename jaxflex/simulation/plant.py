@@ -1,0 +1,110 @@
+"""The closed loop as an ordinary differential equation over a pytree of scalars."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from ..arm.arm import AssembledArm
+from ..control import AbstractController, AbstractReference, Measurement
+from ..drive import DriveState, drive, effect_torques, initial_currents
+from ..dynamics.lagrange import accelerations
+from ..scalars import Scalar, dot
+
+
+class State(NamedTuple):
+    """State of the closed loop, every leaf a scalar (or one a saved time).
+
+    `q` coordinates [rad], [m]; `qd` their rates; `current` [A] of the motors whose
+    current is a state; `memory` of the controller; `held` command under sampled
+    control. What there is none of is None.
+    """
+
+    q: tuple
+    qd: tuple
+    current: tuple | None
+    memory: PyTree
+    held: tuple | None
+
+
+class Plant(eqx.Module):
+    """An assembled arm with all that drives it."""
+
+    model: AssembledArm
+    controller: AbstractController
+    reference: AbstractReference
+    disturbance: AbstractReference | None
+    sample_time: Scalar | None
+
+    def rest(self, angles: tuple) -> State:
+        """The arm at rest and undeflected, its joints at `angles` [rad]."""
+        zero = jnp.zeros_like(angles[0])
+        q = angles + (zero,) * (self.model.size - len(angles))
+        held = None if self.sample_time is None else (zero,) * len(angles)
+        return State(
+            q, (zero,) * len(q), initial_currents(self.model) or None, self.controller.initial(), held
+        )
+
+    def measurement(self, state: State) -> Measurement:
+        """What the controller reads of `state`, without error or delay."""
+        angles, etas = self.model.split(state.q)
+        rates, eta_rates = self.model.split(state.qd)
+        links = self.model.links
+        # A current that is no state depends on the command, which may depend on it: it reads zero.
+        currents = state.current or (jnp.zeros_like(angles[0]),) * len(angles)
+        return Measurement(
+            angle=angles,
+            rate=rates,
+            current=currents,
+            tip_deflection=tuple(map(lambda m, e: dot(m.tip_deflection, e), links, etas)),
+            curvature=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, etas)),
+            curvature_rate=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, eta_rates)),
+        )
+
+    def command(self, t: Scalar, state: State) -> tuple:
+        """Command the controller computes at `t` from `state`."""
+        setpoint = self.reference.setpoint(t)
+        return self.controller.command(t, state.memory, self.measurement(state), setpoint)
+
+    def drives(self, t: Scalar, state: State) -> DriveState:
+        """What the drives do at `t`, under the held command where control is sampled."""
+        command = self.command(t, state) if state.held is None else state.held
+        rates, _ = self.model.split(state.qd)
+        return drive(self.model, command, state.current or (), rates)
+
+    def accelerations(self, t: Scalar, state: State, drives: DriveState) -> tuple:
+        """`q''` of `M q'' + C q' + g + D q' = tau` (Ahmad et al. (27))."""
+        angles, _ = self.model.split(state.q)
+        rates, _ = self.model.split(state.qd)
+        extra = effect_torques(self.model, angles, rates)
+        torques = tuple(map(lambda a, b: a + b, drives.torque, extra))
+        if self.disturbance is not None:
+            torques = tuple(map(lambda a, b: a + b, torques, self.disturbance(t)))
+        zero = jnp.zeros_like(angles[0])
+        torques = torques + (zero,) * (self.model.size - len(torques))
+        damped = map(lambda d, v: d * v, self.model.damping(), state.qd)
+        force = tuple(map(lambda a, b: a - b, torques, damped))
+        return accelerations(self.model, state.q, state.qd, force)
+
+    def derivative(self, t: Scalar, state: State) -> State:
+        """Time derivative of the state, of the same structure."""
+        drives = self.drives(t, state)
+        qdd = self.accelerations(t, state, drives)
+        if self.sample_time is None:
+            setpoint = self.reference.setpoint(t)
+            memory = self.controller.rate(t, state.memory, self.measurement(state), setpoint)
+        else:
+            memory = jtu.tree_map(jnp.zeros_like, state.memory)
+        held = None if state.held is None else tuple(jnp.zeros_like(h) for h in state.held)
+        return State(state.qd, qdd, drives.current_rate or None, memory, held)
+
+    def sampled(self, t: Scalar, state: State) -> State:
+        """The state just after a sample at `t`: command held anew, memory advanced one period."""
+        setpoint = self.reference.setpoint(t)
+        measurement = self.measurement(state)
+        held = self.controller.command(t, state.memory, measurement, setpoint)
+        slope = self.controller.rate(t, state.memory, measurement, setpoint)
+        memory = jtu.tree_map(lambda m, s: m + self.sample_time * s, state.memory, slope)
+        return state._replace(memory=memory, held=held)

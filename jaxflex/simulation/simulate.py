@@ -1,0 +1,190 @@
+"""Simulate an arm under a controller: the one call that everything else is built on."""
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import Array, Float
+
+from ..arm.arm import Arm, AssembledArm
+from ..control import AbstractController, AbstractReference
+from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
+from ..sensors import read_channels
+from .derivatives import both_modes
+from .methods import AbstractMethod, Adaptive, SampleAndHold, sample
+from .plant import Plant, State
+from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
+
+
+class InitialState(eqx.Module):
+    """Where a simulation starts; what is left out is zero.
+
+    `angles` [rad] and `rates` [rad/s] of the joints; `deflections` [m] and
+    `deflection_rates` [m/s] of the modal coordinates, link by link.
+    """
+
+    angles: Float[Array, " joints"] | None = None
+    rates: Float[Array, " joints"] | None = None
+    deflections: Float[Array, " shapes"] | None = None
+    deflection_rates: Float[Array, " shapes"] | None = None
+
+
+def simulate(
+    arm: Arm,
+    controller: AbstractController,
+    reference: AbstractReference,
+    times: Float[Array, " times"],
+    *,
+    initial: InitialState | None = None,
+    disturbance: AbstractReference | None = None,
+    sample_time: ScalarLike | None = None,
+    method: AbstractMethod | None = None,
+    max_steps: int = 200_000,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Trajectory:
+    """Motion of `arm` under `controller` following `reference`, at `times` [s].
+
+    Works under `jit`, `vmap` (over any parameter of the arm, the controller or the
+    reference), `grad` and `jvp`.
+
+    **Arguments**
+
+    - `times`: ascending, at least two; the simulation runs from the first to the last.
+    - `initial`: an `InitialState`; by default at rest, all angles zero.
+    - `disturbance`: torques [N m] on the joints beside the motors.
+    - `sample_time` [s]: the controller computes a command this often and holds it in
+      between; None for continuous control.
+    - `method`: `Adaptive(rtol, atol, solver)` (default, 1e-6) or `Fixed(dt, solver)`.
+      Either steps to every jump of reference and disturbance and to every sample.
+    - `max_steps`: after which the simulation has failed.
+    - `adjoint`: one of diffrax's, to fix how the solve is differentiated; by default
+      forwards through the loop and backwards with checkpoints, whichever is asked for.
+
+    **Returns** a `Trajectory`. Under `vmap` or `jit`, a member that failed has a status
+    other than zero and NaN in its channels: call `.check()` on the result.
+
+    **Raises** `SimulationError` with the reason if the solver fails or the arm diverges
+    (outside of `jit` and `vmap`); `ValueError` for times or references that do not fit.
+    """
+    model = arm.assemble()
+    plant = Plant(model, controller, reference, disturbance, optional_scalar(sample_time))
+    times = jnp.asarray(times, dtype=jnp.result_type(float))
+    if times.shape[0] < 2:
+        raise ValueError(f"simulate needs at least two times, found {times.shape[0]}.")
+    _check_joints(plant, reference, "reference")
+    if disturbance is not None:
+        _check_joints(plant, disturbance, "disturbance")
+    start = initial_state(plant, initial or InitialState())
+    method = Adaptive() if method is None else method
+    inputs = (plant, start, times, method, max_steps, adjoint)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(inputs)):
+        return _integrate(*inputs)
+    return eqx.filter_jit(_integrate)(*inputs).check()
+
+
+def _check_joints(plant: Plant, signal: AbstractReference, what: str) -> None:
+    joints = len(plant.model.joints)
+    given = len(jax.eval_shape(signal, scalar(0.0)))
+    if given != joints:
+        raise ValueError(f"the {what} has {given} joint(s), the arm has {joints}; they must be equal.")
+
+
+def initial_state(plant: Plant, initial: InitialState) -> State:
+    """The plant's state at the start, as scalars.
+
+    **Raises** `ValueError` if the lengths do not fit the arm.
+    """
+    joints = len(plant.model.joints)
+    shapes = plant.model.size - joints
+
+    def scalars(values, count, what):
+        if values is None:
+            return (scalar(0.0),) * count
+        if len(values) != count:
+            raise ValueError(f"initial {what}: the arm has {count}, found {len(values)}.")
+        return tuple(scalar(v) for v in values)
+
+    rest = plant.rest(scalars(initial.angles, joints, "angles"))
+    q = rest.q[:joints] + scalars(initial.deflections, shapes, "deflections")
+    qd = scalars(initial.rates, joints, "rates") + scalars(
+        initial.deflection_rates, shapes, "deflection_rates"
+    )
+    return rest._replace(q=q, qd=qd)
+
+
+def has_diverged(model: AssembledArm, q: tuple) -> Array:
+    """True if a link has bent by more than its length, or a coordinate is not finite."""
+    _, etas = model.split(q)
+    bad = ~jnp.isfinite(sum(q[1:], q[0]))
+    for link, eta in zip(model.links, etas, strict=True):
+        if link.shapes:
+            bad = bad | ~(jnp.abs(dot(link.tip_deflection, eta)) <= link.length)
+    return bad
+
+
+def _integrate(
+    plant: Plant,
+    start: State,
+    times: Float[Array, " times"],
+    method: AbstractMethod,
+    max_steps: int,
+    adjoint: diffrax.AbstractAdjoint | None,
+) -> Trajectory:
+    def solve(inputs, adjoint):
+        plant, start, times, method = inputs
+        signals = [s for s in (plant.reference, plant.disturbance) if s is not None]
+        jumps = jax.lax.stop_gradient(jnp.concatenate([signal.jumps() for signal in signals]))
+        t0 = times[0]
+        solver = method.solver
+        if plant.sample_time is not None:
+            solver = SampleAndHold(solver, t0)
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(lambda t, y, plant: plant.derivative(t, y)),
+            solver,
+            t0,
+            times[-1],
+            method.first_step(),
+            start,
+            args=plant,
+            saveat=diffrax.SaveAt(ts=times),
+            stepsize_controller=method.controller(jumps, t0, plant.sample_time),
+            adjoint=adjoint,
+            event=diffrax.Event(lambda t, y, args, **_: has_diverged(args.model, y.q)),
+            max_steps=max_steps,
+            throw=False,
+        )
+        results = diffrax.RESULTS
+        outcome = jnp.select(
+            [solution.result == results.event_occurred, solution.result == results.max_steps_reached],
+            [DIVERGED, STEPS_EXHAUSTED],
+            jnp.where(solution.result == results.successful, OK, STEP_TOO_SMALL),
+        )
+        stats = solution.stats
+        return solution.ys, outcome, stats["num_accepted_steps"], stats["num_rejected_steps"]
+
+    inputs = (plant, start, times, method)
+    if adjoint is None:
+        differentiable = both_modes(
+            lambda x: solve(x, diffrax.ForwardMode()),
+            lambda x: solve(x, diffrax.RecursiveCheckpointAdjoint()),
+        )
+        states, status, steps, rejected = differentiable(inputs)
+    else:
+        states, status, steps, rejected = solve(inputs, adjoint)
+    status = jnp.where((status == OK) & has_diverged(plant.model, states.q).any(), DIVERGED, status)
+    # a failed member is blanked before the channels are read, so that nothing after its
+    # failure is taken for a measurement
+    states = jtu.tree_map(lambda leaf: jnp.where(status == OK, leaf, jnp.nan), states)
+
+    def read(t: Scalar, state: State):
+        state = sample(plant, times[0], t, state)
+        drives = plant.drives(t, state)
+        qdd = plant.accelerations(t, state, drives)
+        channels = read_channels(plant.model, state.q, state.qd, qdd, drives)
+        for number, value in enumerate(plant.reference(t), 1):
+            channels[f"reference_{number}"] = value
+        return state, channels
+
+    states, channels = jax.vmap(read)(times, states)
+    return Trajectory(times, channels, states, status, steps, rejected)
