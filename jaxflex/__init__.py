@@ -3,11 +3,30 @@
 Pure functions of pytrees, in SI units: everything works under `jit`, `vmap`, `grad` and `jvp`.
 """
 
+# Analysis
+from .analysis.frequencies import clamped_frequencies as clamped_frequencies
+from .analysis.frequencies import driven_frequencies as driven_frequencies
+from .analysis.frequencies import locked_frequencies as locked_frequencies
+from .analysis.linear import LinearModel as LinearModel
+from .analysis.linear import Modes as Modes
+from .analysis.linear import closed_loop_modes as closed_loop_modes
+from .analysis.linear import linearise as linearise
+from .analysis.measures import electrical_energy as electrical_energy
+from .analysis.measures import overshoot as overshoot
+from .analysis.measures import peak as peak
+from .analysis.measures import residual_vibration as residual_vibration
+from .analysis.measures import rise_time as rise_time
+from .analysis.measures import settling_time as settling_time
+from .analysis.measures import spectrum as spectrum
+
 # The model: beam, motor, effects, arm
 from .arm.arm import Arm as Arm
 from .arm.arm import AssembledArm as AssembledArm
 from .arm.energy import kinetic_energy as kinetic_energy
 from .arm.energy import potential_energy as potential_energy
+from .arm.kinematics import tip_position as tip_position
+from .arm.library import ahmad_arm as ahmad_arm
+from .arm.library import foldager_link as foldager_link
 from .arm.parts import Joint as Joint
 from .arm.parts import Link as Link
 from .arm.parts import Payload as Payload
@@ -24,7 +43,18 @@ from .dynamics.lagrange import coriolis_matrix as coriolis_matrix
 from .dynamics.lagrange import gravity_vector as gravity_vector
 from .dynamics.lagrange import lagrangian as lagrangian
 from .dynamics.lagrange import mass_matrix as mass_matrix
+from .dynamics.one_way import OneWayLink as OneWayLink
 from .effects import EFFECTS as EFFECTS
+
+# Files
+from .files.arm_file import ArmFile as ArmFile
+from .files.arm_file import load_arm as load_arm
+from .files.arm_file import read_arm_file as read_arm_file
+from .files.arm_file import save_arm as save_arm
+from .files.fields import ArmFileError as ArmFileError
+from .files.recording import Recording as Recording
+from .files.recording import RecordingError as RecordingError
+from .files.recording import read_recording as read_recording
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 from .scalars import Scalar as Scalar
@@ -33,6 +63,7 @@ from .scalars import scalar as scalar
 from .sensors import Sensor as Sensor
 
 # Simulation
+from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive
 from .simulation.methods import Fixed as Fixed
 from .simulation.simulate import InitialState as InitialState

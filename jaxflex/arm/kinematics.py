@@ -13,9 +13,10 @@ points, and the energies need no absolute angle unless there is gravity.
 from typing import NamedTuple
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from ..scalars import Scalar, dot
-from .arm import AssembledArm
+from .arm import Arm, AssembledArm
 
 
 class FrameVelocity(NamedTuple):
@@ -86,3 +87,10 @@ def poses(model: AssembledArm, q: tuple) -> tuple[list[Pose], list[Pose]]:
         if i + 1 < len(model.links):
             frame = Pose(tip.x, tip.y, tip.heading + angles[i + 1])
     return frames, tips
+
+
+def tip_position(arm: Arm, angles: Float[Array, " joints"]) -> Float[Array, "2"]:
+    """Where the tip [m] is in the base frame with the joints at `angles` [rad] and the links straight."""
+    headings = jnp.cumsum(angles)[: len(arm.links)]
+    lengths = jnp.array([link.length for link in arm.links]).reshape(-1)
+    return jnp.stack([jnp.sum(lengths * jnp.cos(headings)), jnp.sum(lengths * jnp.sin(headings))])

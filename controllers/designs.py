@@ -1,0 +1,125 @@
+"""Designs: a controller, a move and a shaper together, and the textbook ones to compare with."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from jaxflex import (
+    Arm,
+    Scalar,
+    ScalarLike,
+    closed_loop_modes,
+    linearise,
+    locked_frequencies,
+    mass_matrix,
+    scalar,
+)
+
+from .pd import PD
+from .references import Move
+from .shapers import CLASSICAL, Shaped, Shaper, unshaped
+
+OSCILLATORY = 0.7  # a mode damped more than this does not ring
+
+
+class Design(eqx.Module):
+    """What is compared: PD gains, the move they follow, and the shaper that smooths it."""
+
+    controller: PD
+    move: Move
+    shaper: Shaper
+
+    @property
+    def reference(self) -> Shaped:
+        """The move through the shaper."""
+        return Shaped(self.move, self.shaper)
+
+    def move_time(self) -> Scalar:
+        """Time [s] of the commanded move: that of the unshaped move plus that of the shaper."""
+        return self.reference.end()
+
+
+def textbook_pd(arm: Arm, pose: Float[Array, " joints"], bandwidth: ScalarLike | None = None) -> PD:
+    """Critically damped PD for the rigid arm at `pose` [rad], joint by joint.
+
+    Each joint is taken alone with the inertia J that it turns when the links are rigid,
+    so that `J s^2 + (b + K_m K_b / R + K_m K_omega / R) s + K_m K_theta / R` has a
+    double pole at `bandwidth` [rad/s]; without one given, at a third of the lowest
+    frequency with the joints locked, so that the links hardly feel the controller. A
+    damping gain that back-EMF makes needless is zero.
+    """
+    if bandwidth is None:
+        bandwidth = 2 * jnp.pi * locked_frequencies(arm, pose)[0] / 3
+    omega = scalar(bandwidth)
+    n = len(arm.joints)
+    model = arm.assemble()
+    inertia = jnp.diag(mass_matrix(model, jnp.zeros(model.size).at[:n].set(pose)))
+    stiffness, damping = [], []
+    for i, joint in enumerate(arm.joints):
+        torque_gain, back_emf = scalar(1.0), scalar(0.0)
+        if joint.motor is not None and arm.drive != "torque":
+            torque_gain = joint.motor.joint_torque(scalar(1.0))
+            if arm.drive == "voltage":
+                torque_gain = torque_gain / joint.motor.resistance
+                back_emf = joint.motor.back_emf_constant * joint.motor.gear_ratio
+        wanted = 2 * inertia[i] * omega - joint.viscous_friction
+        stiffness.append(inertia[i] * omega**2 / torque_gain)
+        damping.append(jnp.maximum(wanted / torque_gain - back_emf, 0.0))
+    return PD(tuple(stiffness), tuple(damping))
+
+
+def ringing_mode(
+    arm: Arm, pose: Float[Array, " joints"], controller: PD
+) -> tuple[Scalar, Scalar]:
+    """Frequency [Hz] and damping ratio of the mode that a classical shaper should cancel.
+
+    The slowest mode of the closed loop at `pose` that rings at all, with a damping ratio
+    below 0.7. Not for use under `jit`.
+    """
+    modes = closed_loop_modes(linearise(arm, pose, controller))
+    rings = (modes.damping_ratio < OSCILLATORY) & (modes.frequency > 0)
+    if not bool(rings.any()):
+        raise ValueError("no mode of the closed loop rings: a shaper has nothing to cancel.")
+    first = int(jnp.argmax(rings))
+    return modes.frequency[first], jnp.maximum(modes.damping_ratio[first], 0.0)
+
+
+def classical_designs(
+    arm: Arm, controller: PD, move: Move, total_time: ScalarLike
+) -> dict[str, Design]:
+    """A design for every classical shaper with these gains, each lasting `total_time` [s].
+
+    The shaper is designed for the slowest ringing mode of `arm` with its payload, at the
+    end of the move; the move is then stretched or shortened so that with the shaper it
+    lasts `total_time`. A shaper longer than nine tenths of that is left out.
+    """
+    frequency, damping_ratio = ringing_mode(arm, jnp.stack(move.stop), controller)
+    designs = {}
+    for name, make in CLASSICAL.items():
+        shaper = make(frequency, damping_ratio)
+        left = scalar(total_time) - shaper.duration()
+        if left >= 0.1 * scalar(total_time):
+            designs[name] = Design(controller, with_duration(move, left), shaper)
+    return designs
+
+
+def with_duration(move: Move, duration: ScalarLike) -> Move:
+    """The same move in another time [s]."""
+    return eqx.tree_at(lambda m: m.duration, move, scalar(duration))
+
+
+def unshaped_design(controller: PD, move: Move, total_time: ScalarLike | None = None) -> Design:
+    """PD alone, on the move as it is or stretched to `total_time` [s]."""
+    if total_time is not None:
+        move = with_duration(move, total_time)
+    return Design(controller, move, unshaped())
+
+
+def stack(designs: list[Design]) -> Design:
+    """Designs as one batched design, their shapers padded to the same number of impulses."""
+    longest = max(design.shaper.delays.shape[0] for design in designs)
+    padded = [
+        eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs
+    ]
+    return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)

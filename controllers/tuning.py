@@ -1,0 +1,254 @@
+"""Tune PD gains and a free shaper by gradient through the simulation, over payloads.
+
+The cost looks at the tip from the end of the commanded move on: its excursion about the
+target, by payload, in a smooth maximum (so that no payload is sacrificed) and in the
+mean. Logarithms make both free of scale. Effort and peak voltage enter as penalties;
+move time is kept by construction, since the delays of the shaper end where they must.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from jaxflex import (
+    Adaptive,
+    Arm,
+    InitialState,
+    Scalar,
+    ScalarLike,
+    residual_vibration,
+    scalar,
+    simulate,
+    tip_position,
+)
+
+from .assess import with_payloads
+from .bijections import AbstractBijection, Delays, Interval, Simplex
+from .designs import Design
+from .minimise import Minimum, make_stepper, minimise
+from .pd import PD
+from .references import Move
+from .shapers import Shaper
+
+
+class Weights(eqx.Module):
+    """What the cost is made of.
+
+    **Fields** (dimensionless)
+
+    - `worst`: share of the smooth maximum over payloads, the rest goes to their mean
+    - `sharpness`: exponent of the smooth maximum; higher looks at the worst alone
+    - `settling`: weight of the logarithm of the tip's rms distance from the target
+      after the move, which tells a short excursion from one that goes on
+    - `effort`: weight of the mean square voltage as a share of the limit
+    - `margin`: share of the voltage limit above which a penalty sets in; `barrier` its weight
+    """
+
+    worst: float = 0.8
+    sharpness: float = 8.0
+    settling: float = 0.2
+    effort: float = 0.05
+    margin: float = 0.9
+    barrier: float = 100.0
+
+
+class Problem(eqx.Module):
+    """A move to be tuned: an arm, the payloads it carries, the move, and how long to watch.
+
+    **Fields**: `arm`; `payloads` [kg] tuned on; `move` unshaped; `shaper_time` [s] by
+    which the shaper lengthens it; `impulses` of the free shaper; `watch` [s] after the
+    commanded move; `weights`; bounds on the gains as factors of those of `start`.
+    """
+
+    arm: Arm
+    payloads: Float[Array, " payloads"]
+    move: Move
+    start: PD
+    shaper_time: Scalar = eqx.field(converter=scalar)
+    watch: Scalar = eqx.field(converter=scalar, default=3.0)
+    impulses: int = eqx.field(static=True, default=5)
+    samples: int = eqx.field(static=True, default=151)
+    gain_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 10.0))
+    weights: Weights = Weights()
+
+    def domains(self) -> dict[str, AbstractBijection]:
+        """The domain of every parameter."""
+        low, high = self.gain_range
+        floor = 1e-3 * jnp.stack(self.start.stiffness)  # keeps a zero gain's range from being empty
+        stiffness = jnp.stack(self.start.stiffness)
+        damping = jnp.maximum(jnp.stack(self.start.damping), floor)
+        return {
+            "stiffness": Interval(low * stiffness, high * stiffness),
+            "damping": Interval(low * damping, high * damping),
+            "amplitudes": Simplex(),
+            "delays": Delays(self.shaper_time),
+        }
+
+    def values(self, free: Float[Array, " free"]) -> dict[str, Array]:
+        """Parameters from the one unconstrained vector that the minimiser moves."""
+        n, m = len(self.start.stiffness), self.impulses
+        cuts = np.cumsum([n, n, m - 1])
+        parts = jnp.split(free, cuts)
+        return {k: d.value(p) for (k, d), p in zip(self.domains().items(), parts, strict=True)}
+
+    def free(self, values: dict[str, Array]) -> Float[Array, " free"]:
+        """The unconstrained vector that stands for these parameters."""
+        return jnp.concatenate([d.free(values[k]) for k, d in self.domains().items()])
+
+    def design(self, values: dict[str, Array]) -> Design:
+        """The design with these parameters."""
+        controller = PD(tuple(values["stiffness"]), tuple(values["damping"]))
+        return Design(controller, self.move, Shaper(values["amplitudes"], values["delays"]))
+
+    def total_time(self) -> Scalar:
+        """Time [s] of the commanded move, shaper included."""
+        return self.move.end() + self.shaper_time
+
+
+def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
+    """The cost of a design; infinite where a simulation fails."""
+    design = problem.design(values)
+    weights, move = problem.weights, problem.move
+    end = problem.total_time()
+    during = jnp.linspace(0.0, 1.0, problem.samples)[:-1] * end
+    after = end + jnp.linspace(0.0, 1.0, problem.samples) * problem.watch
+    times = jnp.concatenate([during, after])
+    target = tip_position(problem.arm, jnp.stack(move.stop))
+    travel = jnp.linalg.norm(target - tip_position(problem.arm, jnp.stack(move.start)))
+
+    def one(arm):
+        trajectory = simulate(
+            arm,
+            design.controller,
+            design.reference,
+            times,
+            initial=InitialState(angles=jnp.stack(move.start)),
+            method=Adaptive(rtol=1e-4, atol=1e-6),
+            max_steps=50_000,
+            adjoint=diffrax.ForwardMode(),
+        )
+        late = trajectory.tip[problem.samples - 1 :]
+        excursion = residual_vibration(after, late, end, target)
+        distance = jnp.sqrt(jnp.mean(jnp.sum((late - target) ** 2, axis=1)))
+        effort, excess = jnp.zeros(()), jnp.zeros(())
+        for i, joint in enumerate(arm.joints, 1):
+            if joint.motor is not None and joint.motor.voltage_limit is not None:
+                share = trajectory[f"voltage_{i}"] / joint.motor.voltage_limit
+                effort = effort + jnp.mean(share**2)
+                excess = excess + jnp.mean(jnp.maximum(jnp.abs(share) - weights.margin, 0.0) ** 2)
+        ok = trajectory.status == 0
+        # a failed member counts as infinite, and its NaN must not reach the gradient
+        return (
+            jnp.where(ok, excursion / travel, jnp.inf),
+            jnp.where(ok, distance / travel, jnp.inf),
+            effort,
+            excess,
+        )
+
+    excursion, distance, effort, excess = jax.vmap(one)(with_payloads(problem.arm, problem.payloads))
+    p = weights.sharpness
+    logs = jnp.log(excursion)
+    worst = jax.nn.logsumexp(p * logs) / p - jnp.log(logs.shape[0]) / p
+    return (
+        weights.worst * worst
+        + (1 - weights.worst) * jnp.mean(logs)
+        + weights.settling * jnp.mean(jnp.log(distance))
+        + weights.effort * jnp.mean(effort)
+        + weights.barrier * jnp.mean(excess)
+    )
+
+
+class Tuned(NamedTuple):
+    """The outcome of `tune`: the best `design`, its `values`, and every start's `minimum`."""
+
+    design: Design
+    values: dict[str, Array]
+    cost: float
+    minima: list[Minimum]
+
+
+def random_starts(
+    problem: Problem, first: dict[str, Array], count: int, seed: int
+) -> list[Float[Array, " free"]]:
+    """`count` points to start from: `first`, and others scattered about it (normal, one unit wide)."""
+    centre = problem.free(first)
+    scatter = jax.random.normal(jax.random.key(seed), (count - 1, centre.shape[0]), centre.dtype)
+    return [centre, *(centre + row for row in scatter)]
+
+
+def tune(
+    problem: Problem,
+    first: dict[str, Array],
+    starts: int = 8,
+    descents: int = 2,
+    max_steps: int = 60,
+    seconds: float | None = None,
+    seed: int = 0,
+    minimiser: optx.AbstractMinimiser | None = None,
+    progress: Callable[[str, int, float], None] | None = None,
+) -> Tuned:
+    """Gains and shaper of least `cost`, from several starts.
+
+    `starts` points are tried, the `descents` best of them followed down by `minimiser`
+    (BFGS unless told), each for at most `max_steps` evaluations and an equal share of
+    `seconds`. `progress(what, step, cost)` is called on the way.
+
+    **Raises** `RuntimeError` if no start can be simulated.
+    """
+
+    def of_free(free):
+        return cost(problem, problem.values(free))
+
+    points = random_starts(problem, first, starts, seed)
+    screen = eqx.filter_jit(of_free)
+    ranked = []
+    for number, point in enumerate(points, 1):
+        value = float(screen(point))
+        ranked.append((value if np.isfinite(value) else np.inf, number, point))
+        if progress is not None:
+            progress("starts", number, min(r[0] for r in ranked))
+    ranked.sort(key=lambda r: r[:2])
+    if not np.isfinite(ranked[0][0]):
+        raise RuntimeError(
+            "no start of the tuning could be simulated: the loop is unstable or too stiff with all "
+            "of them; begin from other gains or a slower move."
+        )
+    stepper = make_stepper(of_free, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4), points[0])
+    minima = []
+    for number, (_, _, point) in enumerate(ranked[:descents], 1):
+
+        def report(step, value, number=number):
+            if progress is not None:
+                progress(f"descent {number}", step, value)
+
+        share = None if seconds is None else seconds / descents
+        minima.append(minimise(stepper, point, max_steps, share, report))
+    best = min(minima, key=lambda m: m.cost)
+    values = problem.values(best.free)
+    return Tuned(problem.design(values), values, best.cost, minima)
+
+
+def standard_start(problem: Problem) -> dict[str, Array]:
+    """The gains of `problem.start`, and a shaper of equal gaps with binomial amplitudes."""
+    n = problem.impulses
+    weights = np.array([float(np.prod([(n - 1 - j) / (j + 1) for j in range(k)])) for k in range(n)])
+    return {
+        "stiffness": jnp.stack(problem.start.stiffness),
+        "damping": jnp.maximum(
+            jnp.stack(problem.start.damping), 2e-3 * jnp.stack(problem.start.stiffness)
+        ),
+        "amplitudes": jnp.asarray(weights / weights.sum()),
+        "delays": problem.shaper_time * jnp.linspace(0.0, 1.0, n),
+    }
+
+
+def shaper_time(frequency: ScalarLike, damping_ratio: ScalarLike) -> Scalar:
+    """One damped period [s] of a mode: what a ZVD shaper takes, and the tuned one is given."""
+    return 1 / (scalar(frequency) * jnp.sqrt(1 - scalar(damping_ratio) ** 2))

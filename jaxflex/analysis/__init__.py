@@ -1,0 +1,1 @@
+"""Frequencies, linearisation, and measures of how well a move went."""

@@ -1,0 +1,80 @@
+"""Natural frequencies of an arm, its joints free, locked or held by springs."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..arm.arm import Arm, AssembledArm
+from ..beam.basis import make_basis
+from ..beam.mode_shapes import natural_frequencies as beam_frequencies
+from ..dynamics.lagrange import mass_matrix
+
+JointVector = Float[Array, " joints"]
+
+
+def undamped_frequencies(
+    stiffness: Float[Array, "n n"], mass: Float[Array, "n n"]
+) -> Float[Array, " n"]:
+    """`f` [Hz] of `K v = (2 pi f)^2 M v`, ascending; rigid-body motions have zero."""
+    factor = jnp.linalg.cholesky(mass)
+    half = jax.scipy.linalg.solve_triangular(factor, stiffness, lower=True)
+    whitened = jax.scipy.linalg.solve_triangular(factor, half.T, lower=True)
+    values = jnp.linalg.eigvalsh((whitened + whitened.T) / 2)
+    # rounding leaves a rigid body a square of either sign, and a root there has no slope
+    elastic = values > 1e-9 * values[-1]
+    return jnp.where(elastic, jnp.sqrt(jnp.where(elastic, values, 1.0)), 0.0) / (2 * jnp.pi)
+
+
+def _stretched(model: AssembledArm, pose: JointVector | None) -> Float[Array, " coordinates"]:
+    q = jnp.zeros(model.size)
+    return q if pose is None else q.at[: len(model.joints)].set(pose)
+
+
+def driven_frequencies(
+    arm: Arm, pose: JointVector | None = None, joint_stiffness: JointVector | None = None
+) -> Float[Array, " coordinates"]:
+    """Undamped natural frequencies [Hz] with the joints free, rigid-body zeros included.
+
+    `pose`: joint angles [rad] (default zeros, the arm stretched); `joint_stiffness`
+    [N m/rad]: a spring at each joint, such as a stiff controller makes. Gravity's
+    stiffness is left out. Shape `(coordinates,)`, ascending.
+    """
+    model = arm.assemble()
+    stiffness = jnp.stack(model.stiffness())
+    if joint_stiffness is not None:
+        stiffness = stiffness.at[: len(model.joints)].set(joint_stiffness)
+    return undamped_frequencies(jnp.diag(stiffness), mass_matrix(model, _stretched(model, pose)))
+
+
+def locked_frequencies(arm: Arm, pose: JointVector | None = None) -> Float[Array, " shapes"]:
+    """Undamped natural frequencies [Hz] with all joints locked at `pose`. Shape `(shapes,)`."""
+    model = arm.assemble()
+    n = len(model.joints)
+    if model.size == n:
+        return jnp.zeros(0)
+    mass = mass_matrix(model, _stretched(model, pose))[n:, n:]
+    return undamped_frequencies(jnp.diag(jnp.stack(model.stiffness()[n:])), mass)
+
+
+def clamped_frequencies(arm: Arm, link: int) -> Float[Array, " modes"]:
+    """Frequencies [Hz] of link `link` clamped at its root with all that hangs on it at its tip.
+
+    Of an assumed-modes link these are the roots of the frequency equation of Ahmad et
+    al. (23) with the distal mass and inertia; of a lumped link, those of its chain.
+    """
+    part = arm.links[link]
+    if part.modes == 0:
+        return jnp.zeros(0)
+    distal = arm.distal(link)
+    if part.model == "lumped":
+        constants = part.discretise(distal, link + 1 < len(arm.links))
+        tip, slope = jnp.stack(constants.tip_deflection), jnp.stack(constants.tip_slope)
+        mass = jnp.array(constants.modal_inertia) + distal.mass * jnp.outer(tip, tip)
+        mass = mass + distal.inertia * jnp.outer(slope, slope)
+        return undamped_frequencies(jnp.diag(jnp.stack(constants.stiffness)), mass)[: part.modes]
+    basis = make_basis(
+        "clamped_tip_mass", part.modes, part.length, part.mass_per_length,
+        part.flexural_rigidity, distal, False,
+    )  # fmt: skip
+    omega = beam_frequencies(basis.modes, part.mass_per_length, part.flexural_rigidity)
+    return omega / (2 * jnp.pi)

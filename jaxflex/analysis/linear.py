@@ -1,0 +1,130 @@
+"""The closed loop made linear about a resting place, and its modes."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Complex, Float
+
+from ..arm.arm import Arm
+from ..control import AbstractController, AbstractReference, Setpoint
+from ..scalars import Scalar, scalar
+from ..sensors import read_channels
+from ..simulation.plant import Plant, State
+
+
+class _Setpoint(AbstractReference):
+    """A reference that is one given setpoint at all times."""
+
+    given: Setpoint
+
+    def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
+        return self.given.value
+
+    def jumps(self) -> Float[Array, " jumps"]:
+        return jnp.zeros(0)
+
+    def end(self) -> Scalar:
+        return scalar(0.0)
+
+    def setpoint(self, t: Scalar) -> Setpoint:
+        return self.given
+
+
+class LinearModel(NamedTuple):
+    """`x' = A x + B u`, `y = C x + D u` about a resting place.
+
+    State x: coordinates, rates, currents, controller memory, in the order of `State`.
+    Input u: of an open loop the commands; of a closed loop the reference's angle of
+    every joint, then its rate, then its acceleration. Output y: `channels`, in order.
+    """
+
+    A: Float[Array, "states states"]
+    B: Float[Array, "states inputs"]
+    C: Float[Array, "outputs states"]
+    D: Float[Array, "outputs inputs"]
+    channels: tuple[str, ...]
+
+
+class _Commands(AbstractController):
+    """The setpoint's value as the command."""
+
+    def initial(self):
+        return None
+
+    def command(self, t, memory, measurement, setpoint):
+        return setpoint.value
+
+    def rate(self, t, memory, measurement, setpoint):
+        return None
+
+
+def linearise(
+    arm: Arm,
+    pose: Float[Array, " joints"],
+    controller: AbstractController | None = None,
+) -> LinearModel:
+    """`arm` about rest at `pose` [rad], open loop or closed by `controller`.
+
+    The arm is taken undeflected, so with gravity the result holds where its sag is
+    small. Voltage limits and friction enter by their slope at rest.
+    """
+    joints = len(arm.joints)
+    model = arm.assemble()
+    closed = controller is not None
+    law = controller if closed else _Commands()
+    inputs = 3 * joints if closed else joints
+    rest = Plant(model, law, _Setpoint(Setpoint((), (), ())), None, None).rest(
+        tuple(scalar(a) for a in pose)
+    )
+    flat, unflatten = ravel_pytree(rest)
+    bias = tuple(pose) if closed else (scalar(0.0),) * joints
+
+    def plant(u):
+        u = jnp.concatenate([u, jnp.zeros(3 * joints - inputs)])
+        value = tuple(b + du for b, du in zip(bias, u[:joints], strict=True))
+        setpoint = Setpoint(value, tuple(u[joints : 2 * joints]), tuple(u[2 * joints :]))
+        return Plant(model, law, _Setpoint(setpoint), None, None)
+
+    def derivative(x, u):
+        return ravel_pytree(plant(u).derivative(scalar(0.0), unflatten(x)))[0]
+
+    def outputs(x, u):
+        state: State = unflatten(x)
+        loop = plant(u)
+        drives = loop.drives(scalar(0.0), state)
+        qdd = loop.accelerations(scalar(0.0), state, drives)
+        return read_channels(model, state.q, state.qd, qdd, drives)
+
+    def stacked(x, u):
+        return jnp.stack(list(outputs(x, u).values()))
+
+    zero = jnp.zeros(inputs)
+    a, b = jax.jacfwd(derivative, (0, 1))(flat, zero)
+    c, d = jax.jacfwd(stacked, (0, 1))(flat, zero)
+    names = tuple(eqx.filter_eval_shape(outputs, flat, zero))
+    return LinearModel(a, b, c, d, names)
+
+
+class Modes(NamedTuple):
+    """Modes of a linear model: `frequency` [Hz] (undamped), `damping_ratio`, and `poles` [rad/s].
+
+    One entry for every pole of non-negative imaginary part, by rising frequency;
+    entries of real poles have a damping ratio of 1 (or -1 if unstable).
+    """
+
+    frequency: Float[Array, " modes"]
+    damping_ratio: Float[Array, " modes"]
+    poles: Complex[Array, " modes"]
+
+
+def closed_loop_modes(linear: LinearModel) -> Modes:
+    """Modes of `x' = A x`, from its eigenvalues; call it outside of `jit`, on one model."""
+    poles = jnp.linalg.eigvals(linear.A)
+    poles = poles[poles.imag >= 0]
+    poles = poles[jnp.argsort(jnp.abs(poles))]
+    size = jnp.abs(poles)
+    ratio = -poles.real / jnp.where(size > 0, size, 1.0)
+    return Modes(size / (2 * jnp.pi), ratio, poles)

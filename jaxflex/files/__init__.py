@@ -1,0 +1,1 @@
+"""Files that users touch: arm.toml and recordings."""
