@@ -1,0 +1,57 @@
+"""Controllers for flexible arms: references, input shapers, PD control and gradient tuning."""
+
+# What the joints should do
+# How a design fares, and how it is tuned
+from .assess import Assessment as Assessment
+from .assess import assess as assess
+from .assess import measure as measure
+from .assess import run as run
+from .assess import with_payloads as with_payloads
+from .bijections import AbstractBijection as AbstractBijection
+from .bijections import Delays as Delays
+from .bijections import Interval as Interval
+from .bijections import Positive as Positive
+from .bijections import Simplex as Simplex
+
+# Designs to compare
+from .designs import Design as Design
+from .designs import classical_designs as classical_designs
+from .designs import default_move as default_move
+from .designs import ringing_mode as ringing_mode
+from .designs import stack as stack
+from .designs import textbook_pd as textbook_pd
+from .designs import unshaped_design as unshaped_design
+from .designs import with_duration as with_duration
+from .minimise import Minimum as Minimum
+from .minimise import minimise as minimise
+
+# Feedback
+from .pd import PD as PD
+from .pd import OpenLoop as OpenLoop
+from .references import AbstractProfile as AbstractProfile
+from .references import BangBang as BangBang
+from .references import MinimumJerk as MinimumJerk
+from .references import Move as Move
+from .references import Quintic as Quintic
+from .references import Sampled as Sampled
+from .references import SCurve as SCurve
+from .references import Step as Step
+from .references import Trapezoid as Trapezoid
+
+# Input shapers
+from .shapers import CLASSICAL as CLASSICAL
+from .shapers import Shaped as Shaped
+from .shapers import Shaper as Shaper
+from .shapers import convolve as convolve
+from .shapers import ei as ei
+from .shapers import residual_ratio as residual_ratio
+from .shapers import unshaped as unshaped
+from .shapers import zv as zv
+from .shapers import zvd as zvd
+from .shapers import zvdd as zvdd
+from .tuning import Problem as Problem
+from .tuning import Tuned as Tuned
+from .tuning import Weights as Weights
+from .tuning import cost as cost
+from .tuning import standard_start as standard_start
+from .tuning import tune as tune

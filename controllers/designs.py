@@ -40,7 +40,12 @@ class Design(eqx.Module):
         return self.reference.end()
 
 
-def textbook_pd(arm: Arm, pose: Float[Array, " joints"], bandwidth: ScalarLike | None = None) -> PD:
+def textbook_pd(
+    arm: Arm,
+    pose: Float[Array, " joints"],
+    bandwidth: ScalarLike | None = None,
+    feedforward: bool = False,
+) -> PD:
     """Critically damped PD for the rigid arm at `pose` [rad], joint by joint.
 
     Each joint is taken alone with the inertia J that it turns when the links are rigid,
@@ -48,6 +53,9 @@ def textbook_pd(arm: Arm, pose: Float[Array, " joints"], bandwidth: ScalarLike |
     double pole at `bandwidth` [rad/s]; without one given, at a third of the lowest
     frequency with the joints locked, so that the links hardly feel the controller. A
     damping gain that back-EMF makes needless is zero.
+
+    With `feedforward`, the voltage that the same rigid joint needs to follow the
+    reference: `R b / K_m + K_b` on its rate and `R J / K_m` on its acceleration.
     """
     if bandwidth is None:
         bandwidth = 2 * jnp.pi * locked_frequencies(arm, pose)[0] / 3
@@ -55,7 +63,7 @@ def textbook_pd(arm: Arm, pose: Float[Array, " joints"], bandwidth: ScalarLike |
     n = len(arm.joints)
     model = arm.assemble()
     inertia = jnp.diag(mass_matrix(model, jnp.zeros(model.size).at[:n].set(pose)))
-    stiffness, damping = [], []
+    stiffness, damping, rate, acceleration = [], [], [], []
     for i, joint in enumerate(arm.joints):
         torque_gain, back_emf = scalar(1.0), scalar(0.0)
         if joint.motor is not None and arm.drive != "torque":
@@ -63,10 +71,12 @@ def textbook_pd(arm: Arm, pose: Float[Array, " joints"], bandwidth: ScalarLike |
             if arm.drive == "voltage":
                 torque_gain = torque_gain / joint.motor.resistance
                 back_emf = joint.motor.back_emf_constant * joint.motor.gear_ratio
-        wanted = 2 * inertia[i] * omega - joint.viscous_friction
-        stiffness.append(inertia[i] * omega**2 / torque_gain)
-        damping.append(jnp.maximum(wanted / torque_gain - back_emf, 0.0))
-    return PD(tuple(stiffness), tuple(damping))
+        rate.append(joint.viscous_friction / torque_gain + back_emf)
+        acceleration.append(inertia[i] / torque_gain)
+        stiffness.append(acceleration[i] * omega**2)
+        damping.append(jnp.maximum(2 * acceleration[i] * omega - rate[i], 0.0))
+    gains = (tuple(stiffness), tuple(damping))
+    return PD(*gains, tuple(rate), tuple(acceleration)) if feedforward else PD(*gains)
 
 
 def ringing_mode(
@@ -123,3 +133,26 @@ def stack(designs: list[Design]) -> Design:
         eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs
     ]
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
+
+
+def default_move(arm: Arm) -> Move:
+    """A move that makes the arm ring: 0.8 rad of the first joint, 0.5 rad of the others, quintic.
+
+    It takes 1.1 periods of the lowest frequency with the joints locked, or longer where
+    the rigid arm would need more than half of the voltage limit.
+    """
+    stop = tuple(0.8 if i == 0 else 0.5 for i in range(len(arm.joints)))
+    pose = jnp.asarray(stop)
+    locked = locked_frequencies(arm, pose)
+    duration = 1.1 / locked[0] if locked.shape[0] else scalar(1.0)
+    gains = textbook_pd(arm, pose, 1.0, feedforward=True)
+    for i, joint in enumerate(arm.joints):
+        if joint.motor is None or joint.motor.voltage_limit is None or arm.drive != "voltage":
+            continue
+        # peaks of the quintic: rate 15/8 d/T, acceleration 10/sqrt(3) d/T^2; never more than the sum
+        half = joint.motor.voltage_limit / 2
+        rate = gains.rate_feedforward[i] * 15 / 8 * stop[i]
+        acceleration = gains.acceleration_feedforward[i] * 10 / 3**0.5 * stop[i]
+        needed = (rate + jnp.sqrt(rate**2 + 4 * half * acceleration)) / (2 * half)
+        duration = jnp.maximum(duration, needed)
+    return Move((0.0,) * len(stop), stop, duration)

@@ -30,13 +30,32 @@ class Minimum(NamedTuple):
     reason: str
 
 
-def make_stepper(cost: Callable[[Free], Scalar], minimiser: optx.AbstractMinimiser, example: Free):
-    """Functions `start(free)`, `step(free, state)` and `done(free, state)`, compiled once for all starts.
+def with_gradient(cost: Callable[[Free], Scalar]) -> Callable[[Free], Scalar]:
+    """`cost`, whose derivative is computed together with it, forwards, all parameters at once.
 
-    Gradients are taken forwards, which is the cheaper way for the few parameters that a
-    controller has.
+    A minimiser that linearises its function then runs the simulation once a step.
     """
+
+    @jax.custom_jvp
+    def call(free):
+        return cost(free)
+
+    @call.defjvp
+    def _(primals, tangents):
+        def twice(x):
+            value = cost(x)
+            return value, value
+
+        gradient, value = jax.jacfwd(twice, has_aux=True)(primals[0])
+        return value, jnp.dot(gradient, tangents[0])
+
+    return call
+
+
+def make_stepper(cost: Callable[[Free], Scalar], minimiser: optx.AbstractMinimiser, example: Free):
+    """Functions `start(free)` and `step(free, state)`, compiled once for all starts."""
     options = {"autodiff_mode": "fwd"}
+    cost = with_gradient(cost)
     shape = jax.eval_shape(lambda: jnp.zeros((), example.dtype))
 
     def fn(free, args):

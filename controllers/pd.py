@@ -1,11 +1,15 @@
 """Proportional-derivative control of every joint, and the open loop."""
 
+from collections.abc import Sequence
+
 import equinox as eqx
 from jaxtyping import PyTree
 
-from jaxflex import AbstractController, Measurement, Scalar, Setpoint, scalar
+from jaxflex import AbstractController, Measurement, Scalar, ScalarLike, Setpoint, scalar
 
 from .references import scalars
+
+Gains = ScalarLike | Sequence[ScalarLike]
 
 
 class PD(AbstractController):
@@ -16,21 +20,34 @@ class PD(AbstractController):
 
     - `stiffness` K_theta [V/rad], `damping` K_omega [V s/rad]
     - `rate_feedforward` [V s/rad], `acceleration_feedforward` [V s^2/rad] on the
-      reference's rate and acceleration (None: none)
+      reference's rate and acceleration (zero by default)
     """
 
-    stiffness: tuple[Scalar, ...] = eqx.field(converter=scalars)
-    damping: tuple[Scalar, ...] = eqx.field(converter=scalars)
-    rate_feedforward: tuple[Scalar, ...] | None = None
-    acceleration_feedforward: tuple[Scalar, ...] | None = None
+    stiffness: tuple[Scalar, ...]
+    damping: tuple[Scalar, ...]
+    rate_feedforward: tuple[Scalar, ...]
+    acceleration_feedforward: tuple[Scalar, ...]
 
-    def __check_init__(self):
-        lengths = {len(self.stiffness), len(self.damping)}
-        for extra in (self.rate_feedforward, self.acceleration_feedforward):
-            if extra is not None:
-                lengths.add(len(extra))
-        if len(lengths) != 1:
-            raise ValueError("PD: every gain must be given for the same number of joints.")
+    def __init__(
+        self,
+        stiffness: Gains,
+        damping: Gains,
+        rate_feedforward: Gains | None = None,
+        acceleration_feedforward: Gains | None = None,
+    ):
+        self.stiffness = scalars(stiffness)
+        self.damping = scalars(damping)
+        none = (0.0,) * len(self.stiffness)
+        self.rate_feedforward = scalars(none if rate_feedforward is None else rate_feedforward)
+        self.acceleration_feedforward = scalars(
+            none if acceleration_feedforward is None else acceleration_feedforward
+        )
+        lengths = [len(gains) for gains in vars(self).values()]
+        if len(set(lengths)) != 1:
+            raise ValueError(
+                f"PD: every gain is needed once a joint, found {lengths} values for stiffness, "
+                "damping, rate_feedforward and acceleration_feedforward."
+            )
 
     def initial(self) -> PyTree:
         """No memory."""
@@ -44,10 +61,8 @@ class PD(AbstractController):
         for i in range(len(self.stiffness)):
             value = self.stiffness[i] * (setpoint.value[i] - measurement.angle[i])
             value = value + self.damping[i] * (setpoint.rate[i] - measurement.rate[i])
-            if self.rate_feedforward is not None:
-                value = value + self.rate_feedforward[i] * setpoint.rate[i]
-            if self.acceleration_feedforward is not None:
-                value = value + self.acceleration_feedforward[i] * setpoint.acceleration[i]
+            value = value + self.rate_feedforward[i] * setpoint.rate[i]
+            value = value + self.acceleration_feedforward[i] * setpoint.acceleration[i]
             total.append(value)
         return tuple(total)
 

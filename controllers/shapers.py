@@ -104,26 +104,21 @@ def zvdd(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0) -> Shaper:
 def ei(
     frequency: ScalarLike, damping_ratio: ScalarLike = 0.0, tolerance: ScalarLike = 0.05
 ) -> Shaper:
-    """Extra-insensitive, one hump: `tolerance` of the vibration at the mode, zero at both sides.
+    """Extra-insensitive, one hump (Singhose, Seering and Singer 1994).
 
-    Amplitudes and times are the curve fits in damping of Singhose, Seering and Singer
-    (1994), good for damping ratios up to 0.3 and tolerances up to 0.15.
+    At the mode itself the share `tolerance` of the vibration is left, and in return none
+    at two frequencies about it. Undamped: amplitudes (1+v)/4, (1-v)/2, (1+v)/4 half a
+    period apart, v the tolerance. With damping each impulse is weighted with the decay
+    of the mode, as in the damped ZV, and v is chosen so that the share left at the mode
+    is again `tolerance` (at most 1, reached when the mode all but dies within a period).
     """
-    half_period, _ = _mode(frequency, damping_ratio)
-    z, v = scalar(damping_ratio), scalar(tolerance)
-    first = 0.24968 + 0.24962 * v + 0.80008 * z + 1.23328 * v * z + 0.49599 * z**2 + 3.17316 * v * z**2
-    last = 0.25149 + 0.21474 * v - 0.83249 * z + 1.41498 * v * z + 0.85181 * z**2 - 4.90094 * v * z**2
-    middle = (
-        0.49990
-        + (0.46159 + 4.26169 * v + 1.75601 * v**2) * v * z
-        + (8.57843 - 108.644 * v + 336.989 * v**2) * z**2
-    )
-    undamped = z == 0  # there the fit has an exact form
-    first = jnp.where(undamped, (1 + v) / 4, first)
-    last = jnp.where(undamped, (1 + v) / 4, last)
-    middle = jnp.where(undamped, 0.5, middle)
-    amplitudes = jnp.stack([first, 1 - first - last, last])
-    return Shaper(amplitudes, 2 * half_period * jnp.stack([0 * middle, middle, 0 * middle + 1]))
+    half_period, k = _mode(frequency, damping_ratio)
+    tol = scalar(tolerance)
+    room = k**2 - tol * (1 - k) ** 2 / 4
+    v = jnp.where(room > 0, tol * (1 + k) ** 2 / 4 / jnp.where(room > 0, room, 1.0), 1.0)
+    v = jnp.minimum(v, 1.0)
+    weights = jnp.stack([(1 + v) / 4, (1 - v) / 2 * k, (1 + v) / 4 * k**2])
+    return Shaper(weights / weights.sum(), half_period * jnp.arange(3.0))
 
 
 def convolve(first: Shaper, second: Shaper) -> Shaper:

@@ -38,6 +38,9 @@ from .references import Move
 from .shapers import Shaper
 
 
+GAINS = ("stiffness", "damping", "rate_feedforward", "acceleration_feedforward")
+
+
 class Weights(eqx.Module):
     """What the cost is made of.
 
@@ -64,7 +67,9 @@ class Problem(eqx.Module):
 
     **Fields**: `arm`; `payloads` [kg] tuned on; `move` unshaped; `shaper_time` [s] by
     which the shaper lengthens it; `impulses` of the free shaper; `watch` [s] after the
-    commanded move; `weights`; bounds on the gains as factors of those of `start`.
+    commanded move; `weights`; and the bounds on the gains, as factors of those of
+    `start`, which has feedforward (a `textbook_pd(…, feedforward=True)`). High gains are
+    kept out: they amplify the noise of an encoder, and make the loop stiff.
     """
 
     arm: Arm
@@ -75,28 +80,29 @@ class Problem(eqx.Module):
     watch: Scalar = eqx.field(converter=scalar, default=3.0)
     impulses: int = eqx.field(static=True, default=5)
     samples: int = eqx.field(static=True, default=151)
-    gain_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 10.0))
+    stiffness_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 5.0))
+    damping_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 3.0))
+    feedforward_range: tuple[float, float] = eqx.field(static=True, default=(0.3, 3.0))
     weights: Weights = Weights()
 
     def domains(self) -> dict[str, AbstractBijection]:
-        """The domain of every parameter."""
-        low, high = self.gain_range
-        floor = 1e-3 * jnp.stack(self.start.stiffness)  # keeps a zero gain's range from being empty
-        stiffness = jnp.stack(self.start.stiffness)
-        damping = jnp.maximum(jnp.stack(self.start.damping), floor)
-        return {
-            "stiffness": Interval(low * stiffness, high * stiffness),
-            "damping": Interval(low * damping, high * damping),
-            "amplitudes": Simplex(),
-            "delays": Delays(self.shaper_time),
-        }
+        """The domain of every parameter, in the order in which the minimiser sees them."""
+        ranges = (self.stiffness_range, self.damping_range) + 2 * (self.feedforward_range,)
+        domains: dict[str, AbstractBijection] = {}
+        for name, (low, high) in zip(GAINS, ranges, strict=True):
+            # a gain of zero is given some room all the same
+            floor = 1e-3 * jnp.stack(self.start.stiffness)
+            size = jnp.maximum(jnp.stack(getattr(self.start, name)), floor)
+            domains[name] = Interval(low * size, high * size)
+        return domains | {"amplitudes": Simplex(), "delays": Delays(self.shaper_time)}
 
     def values(self, free: Float[Array, " free"]) -> dict[str, Array]:
         """Parameters from the one unconstrained vector that the minimiser moves."""
-        n, m = len(self.start.stiffness), self.impulses
-        cuts = np.cumsum([n, n, m - 1])
+        domains, joints = self.domains(), len(self.start.stiffness)
+        sizes = {"amplitudes": self.impulses - 1, "delays": self.impulses - 2}
+        cuts = np.cumsum([sizes.get(name, joints) for name in domains])[:-1]
         parts = jnp.split(free, cuts)
-        return {k: d.value(p) for (k, d), p in zip(self.domains().items(), parts, strict=True)}
+        return {k: d.value(p) for (k, d), p in zip(domains.items(), parts, strict=True)}
 
     def free(self, values: dict[str, Array]) -> Float[Array, " free"]:
         """The unconstrained vector that stands for these parameters."""
@@ -104,8 +110,8 @@ class Problem(eqx.Module):
 
     def design(self, values: dict[str, Array]) -> Design:
         """The design with these parameters."""
-        controller = PD(tuple(values["stiffness"]), tuple(values["damping"]))
-        return Design(controller, self.move, Shaper(values["amplitudes"], values["delays"]))
+        gains = [tuple(values[name]) for name in GAINS]
+        return Design(PD(*gains), self.move, Shaper(values["amplitudes"], values["delays"]))
 
     def total_time(self) -> Scalar:
         """Time [s] of the commanded move, shaper included."""
@@ -123,6 +129,9 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
     target = tip_position(problem.arm, jnp.stack(move.stop))
     travel = jnp.linalg.norm(target - tip_position(problem.arm, jnp.stack(move.start)))
 
+    motors = [i for i, joint in enumerate(problem.arm.joints, 1) if joint.motor is not None]
+    wanted = ["tip_x", "tip_y", *(f"voltage_{i}" for i in motors)]
+
     def one(arm):
         trajectory = simulate(
             arm,
@@ -131,6 +140,7 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
             times,
             initial=InitialState(angles=jnp.stack(move.start)),
             method=Adaptive(rtol=1e-4, atol=1e-6),
+            channels=wanted,
             max_steps=50_000,
             adjoint=diffrax.ForwardMode(),
         )
@@ -236,14 +246,15 @@ def tune(
 
 
 def standard_start(problem: Problem) -> dict[str, Array]:
-    """The gains of `problem.start`, and a shaper of equal gaps with binomial amplitudes."""
+    """Gains in the middle of their range, and a shaper of equal gaps with binomial amplitudes."""
     n = problem.impulses
     weights = np.array([float(np.prod([(n - 1 - j) / (j + 1) for j in range(k)])) for k in range(n)])
-    return {
-        "stiffness": jnp.stack(problem.start.stiffness),
-        "damping": jnp.maximum(
-            jnp.stack(problem.start.damping), 2e-3 * jnp.stack(problem.start.stiffness)
-        ),
+    middle = {
+        name: jnp.sqrt(domain.low * domain.high)
+        for name, domain in problem.domains().items()
+        if isinstance(domain, Interval)
+    }
+    return middle | {
         "amplitudes": jnp.asarray(weights / weights.sum()),
         "delays": problem.shaper_time * jnp.linspace(0.0, 1.0, n),
     }

@@ -33,8 +33,26 @@ def unit(channel: str) -> str:
     return UNITS[channel.rpartition("_")[0]]
 
 
+def channel_names(model: AssembledArm) -> tuple[str, ...]:
+    """Every channel the arm has, see `read_channels`."""
+    names = []
+    for i, joint in enumerate(model.joints, 1):
+        names += [f"angle_{i}", f"rate_{i}", f"torque_{i}"]
+        if joint.motor is not None:
+            names += [f"voltage_{i}", f"current_{i}"]
+    for i, link in enumerate(model.arm.links, 1):
+        names += [f"tip_deflection_{i}", f"tip_acceleration_{i}"]
+        if link.thickness is not None:
+            names.append(f"strain_{i}")
+    return (*names, "tip_x", "tip_y")
+
+
 def read_channels(
-    model: AssembledArm, q: tuple, qd: tuple, qdd: tuple, drives: DriveState
+    model: AssembledArm,
+    q: tuple,
+    qd: tuple,
+    drives: DriveState,
+    qdd: tuple | None = None,
 ) -> dict[str, Scalar]:
     """Every channel of the arm at an instant, without error.
 
@@ -42,11 +60,13 @@ def read_channels(
     - `voltage_i` [V], `current_i` [A] where joint i has a motor
     - `tip_deflection_i` [m] of link i from its own tangent at the root
     - `strain_i` at the gauge, `h/2 w''`, where the thickness of link i is known
-    - `tip_acceleration_i` [m/s^2], across link i, of its tip in the inertial frame
+    - `tip_acceleration_i` [m/s^2], across link i, of its tip in the inertial frame; only
+      where the accelerations `qdd` are given
     - `tip_x`, `tip_y` [m] of the payload in the base frame
     """
     angles, etas = model.split(q)
     rates, _ = model.split(qd)
+    zero = 0 * angles[0]
     channels: dict[str, Scalar] = {}
     for i, joint in enumerate(model.joints):
         number = i + 1
@@ -56,22 +76,34 @@ def read_channels(
         if joint.motor is not None:
             channels[f"voltage_{number}"] = drives.voltage[i]
             channels[f"current_{number}"] = drives.current[i]
+    for i, link in enumerate(model.arm.links):
+        number, constants = i + 1, model.links[i]
+        channels[f"tip_deflection_{number}"] = dot(constants.tip_deflection, etas[i]) + zero
+        if link.thickness is not None:
+            curvature = dot(constants.gauge_curvature, etas[i])
+            channels[f"strain_{number}"] = link.thickness / 2 * curvature
+    end = poses(model, q)[1][-1]
+    channels["tip_x"] = end.x + zero
+    channels["tip_y"] = end.y + zero
+    if qdd is not None:
+        for i, value in enumerate(tip_accelerations(model, q, qd, qdd), 1):
+            channels[f"tip_acceleration_{i}"] = value
+    return channels
+
+
+def tip_accelerations(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> list[Scalar]:
+    """Acceleration [m/s^2] of every link's tip in the inertial frame, across the link.
+
+    The velocity along the link's axes, differentiated in time, plus what the turning of
+    those axes adds.
+    """
 
     def motion(q, qd):
         return velocities(model, q, qd)
 
     (frames, tips), (_, tip_slopes) = jax.jvp(motion, (q, qd), (qd, qdd))
-    for i, link in enumerate(model.arm.links):
-        number, constants = i + 1, model.links[i]
-        channels[f"tip_deflection_{number}"] = dot(constants.tip_deflection, etas[i]) + 0 * angles[0]
-        if link.thickness is not None:
-            curvature = dot(constants.gauge_curvature, etas[i])
-            channels[f"strain_{number}"] = link.thickness / 2 * curvature
-        channels[f"tip_acceleration_{number}"] = tip_slopes[i].y + frames[i].rate * tips[i].x
-    end = poses(model, q)[1][-1]
-    channels["tip_x"] = end.x + 0 * angles[0]
-    channels["tip_y"] = end.y + 0 * angles[0]
-    return channels
+    count = len(model.arm.links)
+    return [tip_slopes[i].y + frames[i].rate * tips[i].x for i in range(count)]
 
 
 class Sensor(eqx.Module):

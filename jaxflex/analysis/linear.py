@@ -96,7 +96,7 @@ def linearise(
         loop = plant(u)
         drives = loop.drives(scalar(0.0), state)
         qdd = loop.accelerations(scalar(0.0), state, drives)
-        return read_channels(model, state.q, state.qd, qdd, drives)
+        return read_channels(model, state.q, state.qd, drives, qdd)
 
     def stacked(x, u):
         return jnp.stack(list(outputs(x, u).values()))

@@ -1,0 +1,76 @@
+"""The `jaxflex` command."""
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from .cli.modes import modes as modes_command
+from .cli.runtime import command
+from .cli.simulate import simulate as simulate_command
+from .cli.tune import tune as tune_command
+
+app = typer.Typer(
+    help="Flexible-link robot arms driven by DC motors: model, simulate, tune.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+ArmFile = Annotated[
+    Optional[Path], typer.Argument(metavar="[ARM]", help="arm.toml; without one, the built-in two-link arm.")
+]
+Json = Annotated[Optional[Path], typer.Option("--json", help="Write the result to this JSON file.")]
+Output = Annotated[Optional[Path], typer.Option("-o", "--output", help="Folder for figures and tables.")]
+
+
+@app.command()
+def tune(
+    arm: ArmFile = None,
+    payloads: Annotated[str, typer.Option(help="kg, FIRST:LAST:COUNT or A,B,…")] = "0:0.1:6",
+    move: Annotated[Optional[str], typer.Option(help="Target of every joint, rad, A,B,…")] = None,
+    duration: Annotated[Optional[float], typer.Option(help="Duration of the unshaped move, s.")] = None,
+    steps: Annotated[int, typer.Option(help="Steps of the search.")] = 50,
+    seed: Annotated[int, typer.Option(help="Seed of the scattered starts.")] = 0,
+    json: Json = None,
+    output: Output = None,
+) -> None:
+    """Tune PD gains and an input shaper by gradient so that the tip stops ringing for every payload."""
+    command(tune_command)(arm, payloads, move, duration, steps, seed, json, output)
+
+
+@app.command()
+def simulate(
+    arm: ArmFile = None,
+    payload: Annotated[Optional[float], typer.Option(help="Mass at the tip, kg.")] = None,
+    signal: Annotated[
+        Optional[str], typer.Option("--input", help="move, step, bang-bang, or a recording (CSV).")
+    ] = None,
+    duration: Annotated[Optional[float], typer.Option(help="Length of the run, s.")] = None,
+    dt: Annotated[float, typer.Option(help="Time between the rows of the CSV, s.")] = 0.002,
+    json: Json = None,
+    output: Output = None,
+) -> None:
+    """Simulate one run of an arm, or of the design that tune wrote; writes CSV and figure."""
+    command(simulate_command)(arm, payload, signal, duration, dt, json, output)
+
+
+@app.command()
+def modes(
+    arm: ArmFile = None,
+    payloads: Annotated[Optional[str], typer.Option(help="kg, FIRST:LAST:COUNT or A,B,…")] = None,
+    pose: Annotated[Optional[str], typer.Option(help="Angle of every joint, rad, A,B,…")] = None,
+    json: Json = None,
+    output: Output = None,
+) -> None:
+    """Natural frequencies with joints free, locked and controlled, against payload."""
+    command(modes_command)(arm, payloads, pose, json, output)
+
+
+def main() -> None:
+    """Entry point of the command line."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The commands of the command line; nothing else imports from here."""

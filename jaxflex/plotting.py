@@ -1,0 +1,203 @@
+"""Every picture the library draws; each function returns a matplotlib Figure."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .sensors import unit
+from .simulation.trajectory import Trajectory
+
+TITLES = {
+    "angle": "joint angle",
+    "rate": "joint rate",
+    "voltage": "motor voltage",
+    "current": "motor current",
+    "torque": "motor torque",
+    "tip_deflection": "tip deflection",
+    "tip_acceleration": "tip acceleration",
+    "strain": "strain",
+    "reference": "reference",
+    "tip_x": "tip position x",
+    "tip_y": "tip position y",
+}
+BEFORE, AFTER = "#c44e52", "#2a6f97"
+
+
+def _figure(rows: int, columns: int, height: float = 2.6, width: float = 9.0):
+    figure = Figure(figsize=(width, height * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    for axis in axes.flat:
+        axis.grid(True, alpha=0.3, linewidth=0.5)
+        axis.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _shades(count: int):
+    return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
+
+
+def plot_trajectory(trajectory: Trajectory, title: str = "") -> Figure:
+    """One run: angles with their references, deflections, what the motors do, the tip's path in time."""
+    names = [n for n in trajectory.channels if not n.startswith(("reference", "tip_acceleration"))]
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault("tip" if name in ("tip_x", "tip_y") else name.rpartition("_")[0], []).append(name)
+    order = ("angle", "tip_deflection", "tip", "voltage", "current", "torque", "rate", "strain")
+    shown = [kind for kind in order if kind in groups]
+    figure, axes = _figure((len(shown) + 1) // 2, 2)
+    times = np.asarray(trajectory.times)
+    for axis, kind in zip(axes.flat, shown, strict=False):
+        for i, name in enumerate(sorted(groups[kind])):
+            label = name[-1] if kind == "tip" else f"{'link' if 'tip' in kind or kind == 'strain' else 'joint'} {name[-1]}"
+            axis.plot(times, np.asarray(trajectory[name]), color=f"C{i}", label=label)
+            reference = f"reference_{name[-1]}"
+            if kind == "angle" and reference in trajectory.channels:
+                axis.plot(times, np.asarray(trajectory[reference]), "--", color=f"C{i}", linewidth=0.8)
+        one = sorted(groups[kind])[0]
+        word = "tip position" if kind == "tip" else TITLES[kind]
+        axis.set_ylabel(f"{word} [{unit(one)}]")
+        axis.legend(fontsize=8, frameon=False)
+    for axis in list(axes.flat)[len(shown) :]:
+        axis.remove()
+    for axis in figure.axes[-2:]:
+        axis.set_xlabel("time [s]")
+        axis.tick_params(labelbottom=True)
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def plot_before_after(
+    times: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    ends: tuple[float, float],
+    payloads: Sequence[float],
+    labels: tuple[str, str],
+) -> Figure:
+    """Tip deflection of every link for every payload, before and after tuning.
+
+    `before`, `after`: `(payloads, times, links)` [m]; `ends` [s] of the commanded moves.
+    """
+    links = before.shape[-1]
+    figure, axes = _figure(links, 2, height=2.8)
+    for column, (runs, end, label) in enumerate(zip((before, after), ends, labels, strict=True)):
+        for row in range(links):
+            axis: Axes = axes[row, column]
+            for run, payload, shade in zip(runs, payloads, _shades(len(payloads)), strict=True):
+                axis.plot(times, 1e3 * run[:, row], color=shade, label=f"{1e3 * payload:.0f} g", linewidth=1)
+            axis.axvline(end, color="0.4", linestyle=":", linewidth=1)
+            axis.annotate(
+                "end of move", (end, 1.0), xycoords=("data", "axes fraction"),
+                xytext=(3, -9), textcoords="offset points", fontsize=7, color="0.3",
+            )  # fmt: skip
+            axis.set_ylabel(f"tip deflection, link {row + 1} [mm]")
+        axes[0, column].set_title(label, fontsize=10)
+        axes[-1, column].set_xlabel("time [s]")
+    for row in range(links):
+        low = min(axes[row, c].get_ylim()[0] for c in (0, 1))
+        high = max(axes[row, c].get_ylim()[1] for c in (0, 1))
+        for c in (0, 1):
+            axes[row, c].set_ylim(low, high)
+    axes[0, 1].legend(title="payload", fontsize=7, title_fontsize=7, frameon=False, ncols=2)
+    return figure
+
+
+def plot_residual(
+    payloads: np.ndarray, residual: Mapping[str, np.ndarray], tuned: str, tuned_on: Sequence[float]
+) -> Figure:
+    """Residual vibration [m] against payload [kg] for every design, the tuning payloads marked."""
+    figure, axes = _figure(1, 1, height=4.6)
+    axis = axes[0, 0]
+    for i, (name, values) in enumerate(residual.items()):
+        best = name == tuned
+        style = dict(color=AFTER, linewidth=2.6, zorder=5) if best else dict(color=f"C{i % 10}", linewidth=1.1)
+        if not best and "tuned" in name:
+            style["linestyle"] = "--"
+        axis.semilogy(1e3 * payloads, 1e3 * values, label=name, **style)
+        if best:
+            marked = np.interp(np.asarray(tuned_on), payloads, values)
+            axis.semilogy(
+                1e3 * np.asarray(tuned_on), 1e3 * marked, "o", color=AFTER, zorder=6, label="tuned on"
+            )
+    axis.set_xlabel("payload [g]")
+    axis.set_ylabel("residual tip vibration, peak to peak [mm]")
+    axis.grid(True, which="both", alpha=0.25, linewidth=0.5)
+    axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def plot_spectra(
+    frequencies: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    labels: tuple[str, str],
+    quantity: str,
+    top: float,
+) -> Figure:
+    """Spectral densities before and after, worst payload of each, with Hz on their peaks.
+
+    `before`, `after`: `(payloads, frequencies)`; shown up to `top` [Hz].
+    """
+    figure, axes = _figure(1, 1, height=3.8)
+    axis = axes[0, 0]
+    shown = (frequencies > 0) & (frequencies <= top)
+    f = frequencies[shown]
+    for spectra, colour, label in zip((before, after), (BEFORE, AFTER), labels, strict=True):
+        density = np.max(spectra, axis=0)[shown]
+        axis.semilogy(f, density, color=colour, label=label)
+        for peak in strongest_peaks(f, density, 4):
+            axis.plot(f[peak], density[peak], "v", color=colour, markersize=4)
+            axis.annotate(
+                f"{f[peak]:.2f} Hz", (f[peak], density[peak]), xytext=(0, 6),
+                textcoords="offset points", ha="center", fontsize=8, color=colour,
+            )  # fmt: skip
+    axis.set_xlabel("frequency [Hz]")
+    axis.set_ylabel(quantity)
+    axis.margins(y=0.12)
+    axis.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def strongest_peaks(f: np.ndarray, density: np.ndarray, count: int) -> list[int]:
+    """Indices of the `count` highest local maxima that stand at least 3 dB above their surroundings."""
+    inside = (density[1:-1] > density[:-2]) & (density[1:-1] >= density[2:])
+    peaks = []
+    for i in np.flatnonzero(inside) + 1:
+        window = density[max(0, i - 6) : i + 7]
+        if density[i] > 2 * np.median(window):
+            peaks.append(int(i))
+    return sorted(peaks, key=lambda i: -density[i])[:count]
+
+
+def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figure:
+    """Natural frequencies [Hz] against payload [kg]; `families`: title to `(payloads, modes)`."""
+    figure, axes = _figure(1, len(families), height=3.8)
+    for axis, (title, values) in zip(axes[0], families.items(), strict=True):
+        for j in range(values.shape[1]):
+            if np.all(values[:, j] <= 0):
+                continue  # a rigid-body zero has no place on a logarithmic scale
+            axis.semilogy(1e3 * payloads, values[:, j], "o-", markersize=3, color=f"C{j % 10}")
+            axis.annotate(
+                f"{values[-1, j]:.3g} Hz", (1e3 * payloads[-1], values[-1, j]), xytext=(4, -3),
+                textcoords="offset points", fontsize=7, color=f"C{j % 10}",
+            )  # fmt: skip
+        axis.set_title(title, fontsize=10)
+        axis.set_xlabel("payload [g]")
+        axis.margins(x=0.22)
+    axes[0, 0].set_ylabel("natural frequency [Hz]")
+    return figure
+
+
+def plot_history(histories: Sequence[Sequence[float]]) -> Figure:
+    """Cost of the best design so far against the step, for every descent."""
+    figure, axes = _figure(1, 1, height=3.0, width=6.0)
+    for number, history in enumerate(histories, 1):
+        axes[0, 0].plot(np.arange(1, len(history) + 1), history, label=f"descent {number}")
+    axes[0, 0].set_xlabel("step")
+    axes[0, 0].set_ylabel("cost (logarithmic) [1]")
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    return figure
