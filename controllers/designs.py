@@ -130,7 +130,10 @@ def stack(designs: list[Design]) -> Design:
     """Designs as one batched design, their shapers padded to the same number of impulses."""
     longest = max(design.shaper.delays.shape[0] for design in designs)
     padded = [
-        eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs
+        eqx.tree_at(
+            lambda d: d.shaper, design, design.shaper.padded(longest).spread(len(design.move.stop))
+        )
+        for design in designs
     ]
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 

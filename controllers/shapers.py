@@ -16,11 +16,17 @@ Impulses = Float[Array, " impulses"]
 class Shaper(eqx.Module):
     """A train of impulses: `amplitudes` A_i summing to one, `delays` t_i [s] from zero up.
 
-    The free shaper is this class with amplitudes and delays left to `tune`.
+    Amplitudes are common to all joints, shape `(impulses,)`, or each joint has its own,
+    shape `(joints, impulses)`. The free shaper is this class with amplitudes and delays
+    left to `tune`.
     """
 
-    amplitudes: Impulses
+    amplitudes: Float[Array, "*joints impulses"]
     delays: Impulses
+
+    def amplitude(self, joint: int, impulse: int) -> Scalar:
+        """A_i of one joint."""
+        return self.amplitudes[(joint, impulse) if self.amplitudes.ndim == 2 else impulse]
 
     def duration(self) -> Scalar:
         """Time [s] by which the shaper lengthens a move."""
@@ -31,10 +37,16 @@ class Shaper(eqx.Module):
         extra = impulses - self.delays.shape[0]
         if extra < 0:
             raise ValueError(f"the shaper has {self.delays.shape[0]} impulses, more than {impulses}.")
+        joints = self.amplitudes.shape[:-1]
         return Shaper(
-            jnp.append(self.amplitudes, jnp.zeros(extra)),
+            jnp.concatenate([self.amplitudes, jnp.zeros((*joints, extra))], axis=-1),
             jnp.append(self.delays, jnp.full(extra, self.delays[-1])),
         )
+
+    def spread(self, joints: int) -> "Shaper":
+        """The same shaper with its amplitudes written out for every one of `joints`."""
+        shape = (joints, self.delays.shape[0])
+        return Shaper(jnp.broadcast_to(self.amplitudes, shape), self.delays)
 
 
 class Shaped(AbstractReference):
@@ -47,8 +59,8 @@ class Shaped(AbstractReference):
         """Value of every joint at `t` [s]."""
         total = None
         for i in range(self.shaper.delays.shape[0]):
-            amplitude = self.shaper.amplitudes[i]
-            part = tuple(amplitude * v for v in self.reference(t - self.shaper.delays[i]))
+            values = self.reference(t - self.shaper.delays[i])
+            part = tuple(self.shaper.amplitude(j, i) * v for j, v in enumerate(values))
             total = part if total is None else tuple(map(jnp.add, total, part))
         assert total is not None
         return total

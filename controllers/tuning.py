@@ -30,8 +30,8 @@ from jaxflex import (
 )
 
 from .assess import with_payloads
-from .bijections import AbstractBijection, Delays, Interval, Simplex
-from .designs import Design
+from .bijections import AbstractBijection, Delays, Interval, Simplex, SumToOne
+from .designs import Design, with_duration
 from .minimise import Minimum, make_stepper, minimise
 from .pd import PD
 from .references import Move
@@ -79,6 +79,9 @@ class Problem(eqx.Module):
     shaper_time: Scalar = eqx.field(converter=scalar)
     watch: Scalar = eqx.field(converter=scalar, default=3.0)
     impulses: int = eqx.field(static=True, default=5)
+    signed: bool = eqx.field(static=True, default=False)
+    per_joint: bool = eqx.field(static=True, default=False)
+    share_range: tuple[float, float] = eqx.field(static=True, default=(0.05, 0.8))
     samples: int = eqx.field(static=True, default=151)
     stiffness_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 5.0))
     damping_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 3.0))
@@ -94,12 +97,25 @@ class Problem(eqx.Module):
             floor = 1e-3 * jnp.stack(self.start.stiffness)
             size = jnp.maximum(jnp.stack(getattr(self.start, name)), floor)
             domains[name] = Interval(low * size, high * size)
-        return domains | {"amplitudes": Simplex(), "delays": Delays(self.shaper_time)}
+        low, high = self.share_range
+        return domains | {
+            "amplitudes": SumToOne(self.rows()) if self.signed else Simplex(self.rows()),
+            "delays": Delays(1.0),
+            "share": Interval(jnp.full(1, low), jnp.full(1, high)),
+        }
+
+    def rows(self) -> int:
+        """Rows of amplitudes: one for all joints, or one for each."""
+        return len(self.move.stop) if self.per_joint else 1
 
     def values(self, free: Float[Array, " free"]) -> dict[str, Array]:
         """Parameters from the one unconstrained vector that the minimiser moves."""
         domains, joints = self.domains(), len(self.start.stiffness)
-        sizes = {"amplitudes": self.impulses - 1, "delays": self.impulses - 2}
+        sizes = {
+            "amplitudes": self.rows() * (self.impulses - 1),
+            "delays": self.impulses - 2,
+            "share": 1,
+        }
         cuts = np.cumsum([sizes.get(name, joints) for name in domains])[:-1]
         parts = jnp.split(free, cuts)
         return {k: d.value(p) for (k, d), p in zip(domains.items(), parts, strict=True)}
@@ -111,7 +127,13 @@ class Problem(eqx.Module):
     def design(self, values: dict[str, Array]) -> Design:
         """The design with these parameters."""
         gains = [tuple(values[name]) for name in GAINS]
-        return Design(PD(*gains), self.move, Shaper(values["amplitudes"], values["delays"]))
+        amplitudes = values["amplitudes"].reshape(self.rows(), self.impulses)
+        if not self.per_joint:
+            amplitudes = amplitudes[0]
+        share = values["share"][0]
+        move = with_duration(self.move, (1 - share) * self.total_time())
+        shaper = Shaper(amplitudes, share * self.total_time() * values["delays"])
+        return Design(PD(*gains), move, shaper)
 
     def total_time(self) -> Scalar:
         """Time [s] of the commanded move, shaper included."""
@@ -252,11 +274,12 @@ def standard_start(problem: Problem) -> dict[str, Array]:
     middle = {
         name: jnp.sqrt(domain.low * domain.high)
         for name, domain in problem.domains().items()
-        if isinstance(domain, Interval)
+        if isinstance(domain, Interval) and name in GAINS
     }
     return middle | {
-        "amplitudes": jnp.asarray(weights / weights.sum()),
-        "delays": problem.shaper_time * jnp.linspace(0.0, 1.0, n),
+        "amplitudes": jnp.tile(jnp.asarray(weights / weights.sum()), problem.rows()),
+        "delays": jnp.linspace(0.0, 1.0, n),
+        "share": (problem.shaper_time / problem.total_time())[None],
     }
 
 

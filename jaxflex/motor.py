@@ -1,4 +1,4 @@
-"""The permanent-magnet DC motor (Foldager et al. (1)-(7)).
+r"""The permanent-magnet DC motor (Foldager et al. (1)-(7)).
 
                 R          L
     V_a  o----/\/\/\----UUUUU----+

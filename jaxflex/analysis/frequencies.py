@@ -21,7 +21,7 @@ def undamped_frequencies(
     whitened = jax.scipy.linalg.solve_triangular(factor, half.T, lower=True)
     values = jnp.linalg.eigvalsh((whitened + whitened.T) / 2)
     # rounding leaves a rigid body a square of either sign, and a root there has no slope
-    elastic = values > 1e-9 * values[-1]
+    elastic = values > 1e-13 * values[-1]
     return jnp.where(elastic, jnp.sqrt(jnp.where(elastic, values, 1.0)), 0.0) / (2 * jnp.pi)
 
 

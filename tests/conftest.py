@@ -1,0 +1,18 @@
+"""Double precision for every test, a compilation cache off, and the data that is kept elsewhere."""
+
+from pathlib import Path
+
+import jax
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of measured data; tests that need it skip where it is absent."""
+    if not SHARED.is_dir():
+        pytest.skip(f"measured data is not here: {SHARED} is absent")
+    return SHARED
