@@ -55,42 +55,16 @@ class Interval(AbstractBijection):
 
 
 class Simplex(AbstractBijection):
-    """Rows of positive numbers that sum to one, such as the amplitudes of a shaper.
-
-    A softmax with the last logit of a row zero; flat, one row after another.
-    """
-
-    rows: int = eqx.field(static=True, default=1)
+    """Positive numbers that sum to one, such as the amplitudes of a shaper: a softmax, last logit zero."""
 
     def value(self, free: Free) -> Value:
-        """`softmax([free, 0])` of every row, one entry a row longer than `free`."""
-        logits = jnp.pad(free.reshape(self.rows, -1), ((0, 0), (0, 1)))
-        return jax.nn.softmax(logits, axis=1).ravel()
+        """`softmax([free, 0])`, one entry longer than `free`."""
+        return jax.nn.softmax(jnp.append(free, 0.0))
 
     def free(self, value: Value) -> Free:
-        """Logarithms relative to the last entry of a row; zeros count as 1e-6."""
-        logits = jnp.log(jnp.maximum(value, 1e-6)).reshape(self.rows, -1)
-        return (logits[:, :-1] - logits[:, -1:]).ravel()
-
-
-class SumToOne(AbstractBijection):
-    """Rows of `bound`-ed numbers of either sign that sum to one; flat, one row after another.
-
-    All entries but the last of a row are `bound tanh`; the last makes up the sum.
-    """
-
-    rows: int = eqx.field(static=True)
-    bound: Scalar = eqx.field(converter=scalar, default=2.0)
-
-    def value(self, free: Free) -> Value:
-        """One entry a row longer than `free`."""
-        given = self.bound * jnp.tanh(free.reshape(self.rows, -1))
-        return jnp.concatenate([given, 1 - given.sum(axis=1, keepdims=True)], axis=1).ravel()
-
-    def free(self, value: Value) -> Free:
-        """Inverse of `value`."""
-        given = value.reshape(self.rows, -1)[:, :-1] / self.bound
-        return jnp.arctanh(jnp.clip(given, -0.999, 0.999)).ravel()
+        """Logarithms relative to the last entry; zeros count as 1e-6."""
+        logits = jnp.log(jnp.maximum(value, 1e-6))
+        return logits[:-1] - logits[-1]
 
 
 class Delays(AbstractBijection):

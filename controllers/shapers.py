@@ -16,17 +16,11 @@ Impulses = Float[Array, " impulses"]
 class Shaper(eqx.Module):
     """A train of impulses: `amplitudes` A_i summing to one, `delays` t_i [s] from zero up.
 
-    Amplitudes are common to all joints, shape `(impulses,)`, or each joint has its own,
-    shape `(joints, impulses)`. The free shaper is this class with amplitudes and delays
-    left to `tune`.
+    The free shaper is this class with amplitudes and delays left to `tune`.
     """
 
-    amplitudes: Float[Array, "*joints impulses"]
+    amplitudes: Impulses
     delays: Impulses
-
-    def amplitude(self, joint: int, impulse: int) -> Scalar:
-        """A_i of one joint."""
-        return self.amplitudes[(joint, impulse) if self.amplitudes.ndim == 2 else impulse]
 
     def duration(self) -> Scalar:
         """Time [s] by which the shaper lengthens a move."""
@@ -37,16 +31,10 @@ class Shaper(eqx.Module):
         extra = impulses - self.delays.shape[0]
         if extra < 0:
             raise ValueError(f"the shaper has {self.delays.shape[0]} impulses, more than {impulses}.")
-        joints = self.amplitudes.shape[:-1]
         return Shaper(
-            jnp.concatenate([self.amplitudes, jnp.zeros((*joints, extra))], axis=-1),
+            jnp.append(self.amplitudes, jnp.zeros(extra)),
             jnp.append(self.delays, jnp.full(extra, self.delays[-1])),
         )
-
-    def spread(self, joints: int) -> "Shaper":
-        """The same shaper with its amplitudes written out for every one of `joints`."""
-        shape = (joints, self.delays.shape[0])
-        return Shaper(jnp.broadcast_to(self.amplitudes, shape), self.delays)
 
 
 class Shaped(AbstractReference):
@@ -59,8 +47,8 @@ class Shaped(AbstractReference):
         """Value of every joint at `t` [s]."""
         total = None
         for i in range(self.shaper.delays.shape[0]):
-            values = self.reference(t - self.shaper.delays[i])
-            part = tuple(self.shaper.amplitude(j, i) * v for j, v in enumerate(values))
+            amplitude = self.shaper.amplitudes[i]
+            part = tuple(amplitude * v for v in self.reference(t - self.shaper.delays[i]))
             total = part if total is None else tuple(map(jnp.add, total, part))
         assert total is not None
         return total

@@ -30,7 +30,7 @@ from jaxflex import (
 )
 
 from .assess import with_payloads
-from .bijections import AbstractBijection, Delays, Interval, Simplex, SumToOne
+from .bijections import AbstractBijection, Delays, Interval, Simplex
 from .designs import Design, with_duration
 from .minimise import Minimum, make_stepper, minimise
 from .pd import PD
@@ -66,8 +66,9 @@ class Problem(eqx.Module):
     """A move to be tuned: an arm, the payloads it carries, the move, and how long to watch.
 
     **Fields**: `arm`; `payloads` [kg] tuned on; `move` unshaped; `shaper_time` [s] by
-    which the shaper lengthens it; `impulses` of the free shaper; `watch` [s] after the
-    commanded move; `weights`; and the bounds on the gains, as factors of those of
+    which the shaper lengthens it (the sum of both times is kept, how they share it is
+    tuned within `share_range`); `impulses` of the free shaper; `watch` [s] after the
+    commanded move; `samples` of the cost in each half; `weights`; and the bounds on the gains, as factors of those of
     `start`, which has feedforward (a `textbook_pd(…, feedforward=True)`). High gains are
     kept out: they amplify the noise of an encoder, and make the loop stiff.
     """
@@ -79,13 +80,11 @@ class Problem(eqx.Module):
     shaper_time: Scalar = eqx.field(converter=scalar)
     watch: Scalar = eqx.field(converter=scalar, default=3.0)
     impulses: int = eqx.field(static=True, default=5)
-    signed: bool = eqx.field(static=True, default=False)
-    per_joint: bool = eqx.field(static=True, default=False)
     share_range: tuple[float, float] = eqx.field(static=True, default=(0.05, 0.8))
     samples: int = eqx.field(static=True, default=151)
-    stiffness_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 5.0))
-    damping_range: tuple[float, float] = eqx.field(static=True, default=(0.5, 3.0))
-    feedforward_range: tuple[float, float] = eqx.field(static=True, default=(0.3, 3.0))
+    stiffness_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 5.0))
+    damping_range: tuple[float, float] = eqx.field(static=True, default=(0.3, 6.0))
+    feedforward_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 4.0))
     weights: Weights = Weights()
 
     def domains(self) -> dict[str, AbstractBijection]:
@@ -99,23 +98,15 @@ class Problem(eqx.Module):
             domains[name] = Interval(low * size, high * size)
         low, high = self.share_range
         return domains | {
-            "amplitudes": SumToOne(self.rows()) if self.signed else Simplex(self.rows()),
+            "amplitudes": Simplex(),
             "delays": Delays(1.0),
             "share": Interval(jnp.full(1, low), jnp.full(1, high)),
         }
 
-    def rows(self) -> int:
-        """Rows of amplitudes: one for all joints, or one for each."""
-        return len(self.move.stop) if self.per_joint else 1
-
     def values(self, free: Float[Array, " free"]) -> dict[str, Array]:
         """Parameters from the one unconstrained vector that the minimiser moves."""
         domains, joints = self.domains(), len(self.start.stiffness)
-        sizes = {
-            "amplitudes": self.rows() * (self.impulses - 1),
-            "delays": self.impulses - 2,
-            "share": 1,
-        }
+        sizes = {"amplitudes": self.impulses - 1, "delays": self.impulses - 2, "share": 1}
         cuts = np.cumsum([sizes.get(name, joints) for name in domains])[:-1]
         parts = jnp.split(free, cuts)
         return {k: d.value(p) for (k, d), p in zip(domains.items(), parts, strict=True)}
@@ -127,12 +118,9 @@ class Problem(eqx.Module):
     def design(self, values: dict[str, Array]) -> Design:
         """The design with these parameters."""
         gains = [tuple(values[name]) for name in GAINS]
-        amplitudes = values["amplitudes"].reshape(self.rows(), self.impulses)
-        if not self.per_joint:
-            amplitudes = amplitudes[0]
         share = values["share"][0]
         move = with_duration(self.move, (1 - share) * self.total_time())
-        shaper = Shaper(amplitudes, share * self.total_time() * values["delays"])
+        shaper = Shaper(values["amplitudes"], share * self.total_time() * values["delays"])
         return Design(PD(*gains), move, shaper)
 
     def total_time(self) -> Scalar:
@@ -277,7 +265,7 @@ def standard_start(problem: Problem) -> dict[str, Array]:
         if isinstance(domain, Interval) and name in GAINS
     }
     return middle | {
-        "amplitudes": jnp.tile(jnp.asarray(weights / weights.sum()), problem.rows()),
+        "amplitudes": jnp.asarray(weights / weights.sum()),
         "delays": jnp.linspace(0.0, 1.0, n),
         "share": (problem.shaper_time / problem.total_time())[None],
     }
