@@ -40,6 +40,7 @@ class Design(eqx.Module):
         return self.reference.end()
 
 
+@eqx.filter_jit
 def textbook_pd(
     arm: Arm,
     pose: Float[Array, " joints"],
@@ -135,6 +136,7 @@ def stack(designs: list[Design]) -> Design:
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 
 
+@eqx.filter_jit
 def default_move(arm: Arm) -> Move:
     """A move that makes the arm ring: 0.8 rad of the first joint, 0.5 rad of the others, quintic.
 

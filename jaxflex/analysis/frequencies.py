@@ -1,5 +1,6 @@
 """Natural frequencies of an arm, its joints free, locked or held by springs."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -30,6 +31,7 @@ def _stretched(model: AssembledArm, pose: JointVector | None) -> Float[Array, " 
     return q if pose is None else q.at[: len(model.joints)].set(pose)
 
 
+@eqx.filter_jit
 def driven_frequencies(
     arm: Arm, pose: JointVector | None = None, joint_stiffness: JointVector | None = None
 ) -> Float[Array, " coordinates"]:
@@ -46,6 +48,7 @@ def driven_frequencies(
     return undamped_frequencies(jnp.diag(stiffness), mass_matrix(model, _stretched(model, pose)))
 
 
+@eqx.filter_jit
 def locked_frequencies(arm: Arm, pose: JointVector | None = None) -> Float[Array, " shapes"]:
     """Undamped natural frequencies [Hz] with all joints locked at `pose`. Shape `(shapes,)`."""
     model = arm.assemble()

@@ -61,6 +61,7 @@ class _Commands(AbstractController):
         return None
 
 
+@eqx.filter_jit
 def linearise(
     arm: Arm,
     pose: Float[Array, " joints"],

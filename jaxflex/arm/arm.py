@@ -96,6 +96,7 @@ class Arm(eqx.Module):
             root_stiffness=self.links[link].root_stiffness,
         )
 
+    @eqx.filter_jit
     def assemble(self) -> "AssembledArm":
         """The arm with every constant of its links computed, ready for the energies."""
         models = []

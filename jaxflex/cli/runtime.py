@@ -13,7 +13,9 @@ from ..files.fields import ArmFileError
 from ..files.recording import RecordingError
 from ..simulation.trajectory import SimulationError
 
-console = Console(highlight=False)
+WIDTH = 112  # columns that the widest table needs; a narrower terminal wraps
+
+console = Console(highlight=False, width=max(WIDTH, Console().width))
 errors = Console(stderr=True, highlight=False)
 
 

@@ -7,6 +7,7 @@ derivatives without an array in sight, so that XLA fuses them and a batch of arm
 becomes a struct of arrays.
 """
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -15,6 +16,7 @@ from ..arm.arm import AssembledArm
 from ..arm.energy import kinetic_energy, potential_energy
 from ..scalars import Scalar
 from .ldl import solve
+from .simplify import simplified
 
 Coordinates = Float[Array, " coordinates"]
 Matrix = Float[Array, "coordinates coordinates"]
@@ -25,6 +27,7 @@ def lagrangian(model: AssembledArm, q: Coordinates, qd: Coordinates) -> Scalar:
     return kinetic_energy(model, tuple(q), tuple(qd)) - potential_energy(model, tuple(q))
 
 
+@eqx.filter_jit
 def mass_matrix(model: AssembledArm, q: Coordinates) -> Matrix:
     """`M = d^2 T / dq'^2`, symmetric positive definite, shape `(n, n)`."""
     return jax.hessian(lagrangian, argnums=2)(model, q, jnp.zeros_like(q))
@@ -51,7 +54,7 @@ def damping_vector(model: AssembledArm) -> Coordinates:
     return jnp.stack(model.damping())
 
 
-@jax.jit
+@simplified
 def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
     """`q'' = M^-1 (force - bias)`, all tuples of scalars.
 

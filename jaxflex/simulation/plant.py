@@ -11,6 +11,7 @@ from ..arm.arm import AssembledArm
 from ..control import AbstractController, AbstractReference, Measurement
 from ..drive import DriveState, drive, effect_torques, initial_currents
 from ..dynamics.lagrange import accelerations
+from ..dynamics.simplify import simplified
 from ..scalars import Scalar, dot
 
 
@@ -108,3 +109,9 @@ class Plant(eqx.Module):
         slope = self.controller.rate(t, state.memory, measurement, setpoint)
         memory = jtu.tree_map(lambda m, s: m + self.sample_time * s, state.memory, slope)
         return state._replace(memory=memory, held=held)
+
+
+@simplified
+def derivative(t: Scalar, state: State, plant: Plant) -> State:
+    """`plant.derivative(t, state)` as the solver calls it."""
+    return plant.derivative(t, state)

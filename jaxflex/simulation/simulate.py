@@ -15,7 +15,7 @@ from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
 from .methods import AbstractMethod, Adaptive, SampleAndHold, sample
-from .plant import Plant, State
+from .plant import Plant, State, derivative
 from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
 
 
@@ -157,7 +157,7 @@ def _integrate(
         if plant.sample_time is not None:
             solver = SampleAndHold(solver, t0)
         solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda t, y, plant: plant.derivative(t, y)),
+            diffrax.ODETerm(derivative),
             solver,
             t0,
             times[-1],

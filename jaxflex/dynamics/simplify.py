@@ -1,0 +1,77 @@
+"""Trace a function once and drop what autodiff computed twice or for nobody.
+
+Nested derivatives leave a program in which most equations are repeated or unused. XLA
+removes them in the end, but only after JAX has batched, differentiated and lowered each:
+most of the time before a first simulation went there. Here the program is cleaned right
+after it is traced, before anything is done with it.
+"""
+
+from collections.abc import Callable
+from functools import wraps
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+from jax.extend import core
+
+
+def simplified(function: Callable) -> Callable:
+    """`function` of pytrees of arrays, its program traced, cleaned and cached."""
+
+    @eqx.filter_jit
+    @wraps(function)
+    def call(*args):
+        arrays, static = eqx.partition(args, eqx.is_array)
+        leaves, tree = jtu.tree_flatten(arrays)
+
+        def flat(*leaves):
+            return function(*eqx.combine(jtu.tree_unflatten(tree, leaves), static))
+
+        program, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+        outputs = core.jaxpr_as_fun(without_waste(program))(*leaves)
+        return jtu.tree_unflatten(jtu.tree_structure(shape), outputs)
+
+    return call
+
+
+def without_waste(program: core.ClosedJaxpr) -> core.ClosedJaxpr:
+    """The same program without equal equations computed twice, and without unused ones."""
+    same: dict = {}  # variable -> the equal one computed first
+    first: dict = {}  # operation and operands -> its results
+    kept = []
+    for equation in program.jaxpr.eqns:
+        operands = [v if isinstance(v, core.Literal) else same.get(v, v) for v in equation.invars]
+        key = _key(equation, operands)
+        if key is not None and key in first:
+            same.update(zip(equation.outvars, first[key], strict=True))
+            continue
+        if key is not None:
+            first[key] = equation.outvars
+        kept.append(equation.replace(invars=operands))
+    results = [v if isinstance(v, core.Literal) else same.get(v, v) for v in program.jaxpr.outvars]
+    needed = {v for v in results if not isinstance(v, core.Literal)}
+    useful = []
+    for equation in reversed(kept):
+        if equation.effects or any(v in needed for v in equation.outvars):
+            useful.append(equation)
+            needed.update(v for v in equation.invars if not isinstance(v, core.Literal))
+    jaxpr = program.jaxpr.replace(eqns=useful[::-1], outvars=results)
+    return core.ClosedJaxpr(jaxpr, program.consts)
+
+
+def _key(equation: core.JaxprEqn, operands: list):
+    """What makes an equation equal to another, or None if it must stand for itself."""
+    if equation.effects:
+        return None
+    names = tuple(
+        (v.val.item(), str(v.aval)) if isinstance(v, core.Literal) and getattr(v.val, "ndim", 1) == 0
+        else (v.val, str(v.aval)) if isinstance(v, core.Literal)
+        else v
+        for v in operands
+    )  # fmt: skip
+    key = (equation.primitive, names, tuple(equation.params.items()))
+    try:
+        hash(key)
+    except TypeError:
+        return None
+    return key
