@@ -1,7 +1,9 @@
 """How a design fares on an arm: the measures that `tune` compares, over payloads."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -45,16 +47,24 @@ class Assessment(NamedTuple):
 
 
 def run(
-    design: Design, arm: Arm, times: Float[Array, " times"], method: AbstractMethod | None = None
+    design: Design,
+    arm: Arm,
+    times: Float[Array, " times"],
+    method: AbstractMethod | None = None,
+    channels: Sequence[str] | None = None,
 ) -> Trajectory:
-    """`arm` from rest at the start of the design's move, until the last of `times` [s]."""
+    """`arm` from rest at the start of the design's move, until the last of `times` [s].
+
+    The default method suits loops in which stability sets the step.
+    """
     return simulate(
         arm,
         design.controller,
         design.reference,
         times,
         initial=InitialState(angles=jnp.stack(design.move.start)),
-        method=method or Adaptive(rtol=1e-5, atol=1e-7),
+        method=method or Adaptive(rtol=1e-6, atol=1e-8, solver=diffrax.Bosh3()),
+        channels=channels,
     )
 
 
@@ -83,6 +93,15 @@ def with_payloads(arm: Arm, payloads: Float[Array, " payloads"]) -> Arm:
     return jax.vmap(arm.with_payload)(payloads)
 
 
+def assessed_channels(arm: Arm) -> list[str]:
+    """The channels that `assess` keeps: tip, deflections, what the motors do, acceleration of the last tip."""
+    links = range(1, len(arm.links) + 1)
+    motors = [i for i, joint in enumerate(arm.joints, 1) if joint.motor is not None]
+    names = ["tip_x", "tip_y", *(f"tip_deflection_{i}" for i in links)]
+    names += [f"{kind}_{i}" for i in motors for kind in ("voltage", "current")]
+    return [*names, f"tip_acceleration_{len(arm.links)}"] if arm.links else names
+
+
 @eqx.filter_jit
 def assess(
     designs: Design, arms: Arm, times: Float[Array, " times"]
@@ -90,7 +109,7 @@ def assess(
     """Every design of a batch on every arm of a batch; leading axes design, arm."""
 
     def one(design, arm):
-        trajectory = run(design, arm, times)
+        trajectory = run(design, arm, times, channels=assessed_channels(arm))
         return measure(design, arm, trajectory), trajectory
 
     over_arms = eqx.filter_vmap(one, in_axes=(None, eqx.if_array(0)))

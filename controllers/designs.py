@@ -88,7 +88,7 @@ def ringing_mode(
     The slowest mode of the closed loop at `pose` that rings at all, with a damping ratio
     below 0.7. Not for use under `jit`.
     """
-    modes = closed_loop_modes(linearise(arm, pose, controller))
+    modes = closed_loop_modes(linearise(arm, pose, controller, ()))
     rings = (modes.damping_ratio < OSCILLATORY) & (modes.frequency > 0)
     if not bool(rings.any()):
         raise ValueError("no mode of the closed loop rings: a shaper has nothing to cancel.")

@@ -228,11 +228,11 @@ def tune(
         return cost(problem, problem.values(free))
 
     points = random_starts(problem, first, starts, seed)
-    screen = eqx.filter_jit(of_free)
+    stepper = make_stepper(of_free, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4), points[0])
     ranked = []
     for number, point in enumerate(points, 1):
-        value = float(screen(point))
-        ranked.append((value if np.isfinite(value) else np.inf, number, point))
+        # the first step only evaluates, and needs no program of its own
+        ranked.append((minimise(stepper, point, 1).cost, number, point))
         if progress is not None:
             progress("starts", number, min(r[0] for r in ranked))
     ranked.sort(key=lambda r: r[:2])
@@ -241,7 +241,6 @@ def tune(
             "no start of the tuning could be simulated: the loop is unstable or too stiff with all "
             "of them; begin from other gains or a slower move."
         )
-    stepper = make_stepper(of_free, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4), points[0])
     minima = []
     for number, (_, _, point) in enumerate(ranked[:descents], 1):
 

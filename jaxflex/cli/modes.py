@@ -70,7 +70,7 @@ def modes(
 def _controlled(arm: Arm, pose: jnp.ndarray) -> Table:
     """Frequency and damping of the arm as a textbook PD controls it."""
     bandwidth = None if arm.links and any(link.modes for link in arm.links) else 2 * np.pi
-    linear = linearise(arm, pose, textbook_pd(arm, pose, bandwidth))
+    linear = linearise(arm, pose, textbook_pd(arm, pose, bandwidth), ())
     found = closed_loop_modes(linear)
     table = Table("as driven by the textbook PD, nominal payload", ["mode", "frequency [Hz]", "damping ratio"])
     for i, (f, z) in enumerate(zip(found.frequency.tolist(), found.damping_ratio.tolist(), strict=True), 1):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import equinox as eqx
@@ -96,7 +97,12 @@ def tune(
         f"{total:.3g} s with the shaper; lowest locked frequency "
         f"{float(locked_frequencies(middle, jnp.stack(path.stop))[0]):.3g} Hz"
     )
-    tuned = _search(problem, steps, seed)
+    with ThreadPoolExecutor(1) as pool:
+        # while one core searches, the other compiles the comparison, on a design of the same shape
+        first = problem.design(standard_start(problem))
+        warm = pool.submit(compare, middle, masses, chosen, path, total, first)
+        tuned = _search(problem, steps, seed)
+        warm.exception()  # a first design that cannot be simulated is no reason to stop
     comparison = compare(middle, masses, chosen, path, total, tuned.design)
     seconds = time.monotonic() - began
     shown = comparison_tables(comparison)
