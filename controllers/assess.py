@@ -35,7 +35,8 @@ class Assessment(NamedTuple):
     `residual_vibration` [m] after the commanded move, `settling_time` [s] from the
     start of the move into one hundredth of the tip's travel, `overshoot` [%] of the
     tip along the line from start to target, `peak_voltage` [V] and `energy` [J] over
-    all motors (zero without motors), `status` of the simulation.
+    all motors (zero without motors), `deflection` the largest tip deflection as a share
+    of its link's length, `status` of the simulation.
     """
 
     residual_vibration: Float[Array, "*batch"]
@@ -43,6 +44,7 @@ class Assessment(NamedTuple):
     overshoot: Float[Array, "*batch"]
     peak_voltage: Float[Array, "*batch"]
     energy: Float[Array, "*batch"]
+    deflection: Float[Array, "*batch"]
     status: Array
 
 
@@ -77,6 +79,9 @@ def measure(design: Design, arm: Arm, trajectory: Trajectory) -> Assessment:
     along = (tip - start) @ (target - start) / travel**2
     voltages = [v for name, v in trajectory.channels.items() if name.startswith("voltage_")]
     currents = [v for name, v in trajectory.channels.items() if name.startswith("current_")]
+    bends = [
+        peak(trajectory[f"tip_deflection_{i}"]) / link.length for i, link in enumerate(arm.links, 1)
+    ]
     zero = jnp.zeros(())
     return Assessment(
         residual_vibration(times, tip, design.move_time(), target),
@@ -84,6 +89,7 @@ def measure(design: Design, arm: Arm, trajectory: Trajectory) -> Assessment:
         overshoot(along, 0.0, 1.0),
         jnp.max(jnp.stack([zero, *(peak(v) for v in voltages)])),
         sum((electrical_energy(times, v, i) for v, i in zip(voltages, currents, strict=True)), zero),
+        jnp.max(jnp.stack([zero, *bends])),
         trajectory.status,
     )
 

@@ -51,15 +51,20 @@ class Weights(eqx.Module):
     - `settling`: weight of the logarithm of the tip's rms distance from the target
       after the move, which tells a short excursion from one that goes on
     - `effort`: weight of the mean square voltage as a share of the limit
-    - `margin`: share of the voltage limit above which a penalty sets in; `barrier` its weight
+    - `voltage`: share of the voltage limit above which a penalty sets in
+    - `deflection`: share of a link's length above which its tip deflection is penalised:
+      beyond a tenth the small-deflection model no longer holds, and a search that may
+      leave it would
+    - `barrier`: weight of both penalties, on the square of the relative excess
     """
 
     worst: float = 0.8
     sharpness: float = 8.0
     settling: float = 0.2
     effort: float = 0.05
-    margin: float = 0.9
-    barrier: float = 100.0
+    voltage: float = 0.9
+    deflection: float = 0.1
+    barrier: float = 1000.0
 
 
 class Problem(eqx.Module):
@@ -128,6 +133,11 @@ class Problem(eqx.Module):
         return self.move.end() + self.shaper_time
 
 
+def beyond(signal: Float[Array, " times"], limit: float) -> Scalar:
+    """Square of the relative excess of the signal's peak over `limit`; zero within it."""
+    return jnp.maximum(jnp.max(jnp.abs(signal)) / limit - 1, 0.0) ** 2
+
+
 def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
     """The cost of a design; infinite where a simulation fails."""
     design = problem.design(values)
@@ -140,7 +150,9 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
     travel = jnp.linalg.norm(target - tip_position(problem.arm, jnp.stack(move.start)))
 
     motors = [i for i, joint in enumerate(problem.arm.joints, 1) if joint.motor is not None]
+    bending = [i for i, link in enumerate(problem.arm.links, 1) if link.modes]
     wanted = ["tip_x", "tip_y", *(f"voltage_{i}" for i in motors)]
+    wanted += [f"tip_deflection_{i}" for i in bending]
 
     def one(arm):
         trajectory = simulate(
@@ -159,11 +171,15 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
         excursion = residual_vibration(after, late, end, target)
         distance = jnp.sqrt(jnp.mean(jnp.sum((late - target) ** 2, axis=1)))
         effort, excess = jnp.zeros(()), jnp.zeros(())
-        for i, joint in enumerate(arm.joints, 1):
-            if joint.motor is not None and joint.motor.voltage_limit is not None:
-                share = trajectory[f"voltage_{i}"] / joint.motor.voltage_limit
+        for i in motors:
+            limit = arm.joints[i - 1].motor.voltage_limit
+            if limit is not None:
+                share = trajectory[f"voltage_{i}"] / limit
                 effort = effort + jnp.mean(share**2)
-                excess = excess + jnp.mean(jnp.maximum(jnp.abs(share) - weights.margin, 0.0) ** 2)
+                excess = excess + beyond(share, weights.voltage)
+        for i in bending:
+            share = trajectory[f"tip_deflection_{i}"] / arm.links[i - 1].length
+            excess = excess + beyond(share, weights.deflection)
         ok = trajectory.status == 0
         # a failed member counts as infinite, and its NaN must not reach the gradient
         return (

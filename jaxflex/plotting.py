@@ -115,7 +115,7 @@ def plot_residual(
     for i, (name, values) in enumerate(residual.items()):
         best = name == tuned
         style = dict(color=AFTER, linewidth=2.6, zorder=5) if best else dict(color=f"C{i % 10}", linewidth=1.1)
-        if not best and "tuned" in name:
+        if "tuned PD" in name:
             style["linestyle"] = "--"
         axis.semilogy(1e3 * payloads, 1e3 * values, label=name, **style)
         if best:
@@ -163,14 +163,19 @@ def plot_spectra(
 
 
 def strongest_peaks(f: np.ndarray, density: np.ndarray, count: int) -> list[int]:
-    """Indices of the `count` highest local maxima that stand at least 3 dB above their surroundings."""
+    """Indices of the `count` highest local maxima, 3 dB above their surroundings and apart from each other."""
     inside = (density[1:-1] > density[:-2]) & (density[1:-1] >= density[2:])
     peaks = []
     for i in np.flatnonzero(inside) + 1:
         window = density[max(0, i - 6) : i + 7]
         if density[i] > 2 * np.median(window):
             peaks.append(int(i))
-    return sorted(peaks, key=lambda i: -density[i])[:count]
+    apart = 0.04 * (f[-1] - f[0])  # closer ones could not be labelled side by side
+    chosen: list[int] = []
+    for i in sorted(peaks, key=lambda i: -density[i]):
+        if all(abs(f[i] - f[j]) > apart for j in chosen):
+            chosen.append(i)
+    return chosen[:count]
 
 
 def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figure:
@@ -187,7 +192,10 @@ def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figu
             )  # fmt: skip
         axis.set_title(title, fontsize=10)
         axis.set_xlabel("payload [g]")
-        axis.margins(x=0.22)
+        axis.margins(x=0.3, y=0.08)
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("{x:g}")
+        axis.tick_params(which="both", labelsize=8)
     axes[0, 0].set_ylabel("natural frequency [Hz]")
     return figure
 

@@ -237,6 +237,7 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
         ("settling_time", "settling time of the tip into 1 % of its travel [s]", 1.0),
         ("overshoot", "overshoot of the tip [%]", 1.0),
         ("peak_voltage", "peak motor voltage [V]", 1.0),
+        ("deflection", "largest tip deflection [% of the link's length]", 100.0),
     ]
     result = []
     for measure, title, scale in measures:
@@ -341,6 +342,7 @@ def as_json(comparison: Comparison, tuned: Tuned, masses: list[float], seconds: 
         "overshoot": "overshoot_pct",
         "peak_voltage": "peak_voltage_V",
         "energy": "energy_J",
+        "deflection": "deflection_share",
     }
     designs = {}
     for name, design in comparison.designs.items():
