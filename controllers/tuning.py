@@ -64,7 +64,7 @@ class Weights(eqx.Module):
     effort: float = 0.05
     voltage: float = 0.9
     deflection: float = 0.1
-    barrier: float = 1000.0
+    barrier: float = 300.0
 
 
 class Problem(eqx.Module):
@@ -89,7 +89,7 @@ class Problem(eqx.Module):
     samples: int = eqx.field(static=True, default=121)
     stiffness_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 5.0))
     damping_range: tuple[float, float] = eqx.field(static=True, default=(0.3, 6.0))
-    feedforward_range: tuple[float, float] = eqx.field(static=True, default=(0.1, 4.0))
+    feedforward_range: tuple[float, float] = eqx.field(static=True, default=(0.25, 4.0))
     weights: Weights = Weights()
 
     def domains(self) -> dict[str, AbstractBijection]:
