@@ -189,7 +189,8 @@ def _integrate(
         states, status, steps, rejected = differentiable(inputs)
     else:
         states, status, steps, rejected = solve(inputs, adjoint)
-    status = jnp.where((status == OK) & has_diverged(plant.model, states.q).any(), DIVERGED, status)
+    lost = jax.vmap(lambda q: has_diverged(plant.model, q))(states.q).any()
+    status = jnp.where((status == OK) & lost, DIVERGED, status)
     # a failed member is blanked before the channels are read, so that nothing after its
     # failure is taken for a measurement
     states = jtu.tree_map(lambda leaf: jnp.where(status == OK, leaf, jnp.nan), states)
