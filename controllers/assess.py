@@ -79,9 +79,7 @@ def measure(design: Design, arm: Arm, trajectory: Trajectory) -> Assessment:
     along = (tip - start) @ (target - start) / travel**2
     voltages = [v for name, v in trajectory.channels.items() if name.startswith("voltage_")]
     currents = [v for name, v in trajectory.channels.items() if name.startswith("current_")]
-    bends = [
-        peak(trajectory[f"tip_deflection_{i}"]) / link.length for i, link in enumerate(arm.links, 1)
-    ]
+    bends = [peak(trajectory[f"tip_deflection_{i}"]) / link.length for i, link in enumerate(arm.links, 1)]
     zero = jnp.zeros(())
     return Assessment(
         residual_vibration(times, tip, design.move_time(), target),
@@ -109,9 +107,7 @@ def assessed_channels(arm: Arm) -> list[str]:
 
 
 @eqx.filter_jit
-def assess(
-    designs: Design, arms: Arm, times: Float[Array, " times"]
-) -> tuple[Assessment, Trajectory]:
+def assess(designs: Design, arms: Arm, times: Float[Array, " times"]) -> tuple[Assessment, Trajectory]:
     """Every design of a batch on every arm of a batch; leading axes design, arm."""
 
     def one(design, arm):

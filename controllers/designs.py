@@ -80,9 +80,7 @@ def textbook_pd(
     return PD(*gains, tuple(rate), tuple(acceleration)) if feedforward else PD(*gains)
 
 
-def ringing_mode(
-    arm: Arm, pose: Float[Array, " joints"], controller: PD
-) -> tuple[Scalar, Scalar]:
+def ringing_mode(arm: Arm, pose: Float[Array, " joints"], controller: PD) -> tuple[Scalar, Scalar]:
     """Frequency [Hz] and damping ratio of the mode that a classical shaper should cancel.
 
     The slowest mode of the closed loop at `pose` that rings at all, with a damping ratio
@@ -96,9 +94,7 @@ def ringing_mode(
     return modes.frequency[first], jnp.maximum(modes.damping_ratio[first], 0.0)
 
 
-def classical_designs(
-    arm: Arm, controller: PD, move: Move, total_time: ScalarLike
-) -> dict[str, Design]:
+def classical_designs(arm: Arm, controller: PD, move: Move, total_time: ScalarLike) -> dict[str, Design]:
     """A design for every classical shaper with these gains, each lasting `total_time` [s].
 
     The shaper is designed for the slowest ringing mode of `arm` with its payload, at the
@@ -130,9 +126,7 @@ def unshaped_design(controller: PD, move: Move, total_time: ScalarLike | None = 
 def stack(designs: list[Design]) -> Design:
     """Designs as one batched design, their shapers padded to the same number of impulses."""
     longest = max(design.shaper.delays.shape[0] for design in designs)
-    padded = [
-        eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs
-    ]
+    padded = [eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs]
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 
 

@@ -66,9 +66,7 @@ class PD(AbstractController):
             total.append(value)
         return tuple(total)
 
-    def rate(
-        self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
-    ) -> PyTree:
+    def rate(self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint) -> PyTree:
         """No memory."""
         return None
 
@@ -88,8 +86,6 @@ class OpenLoop(AbstractController):
         """`gain` times the reference of every joint."""
         return tuple(self.gain * value for value in setpoint.value)
 
-    def rate(
-        self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
-    ) -> PyTree:
+    def rate(self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint) -> PyTree:
         """No memory."""
         return None

@@ -106,8 +106,7 @@ class Move(AbstractReference):
     def __check_init__(self):
         if len(self.start) != len(self.stop):
             raise ValueError(
-                f"Move: start has {len(self.start)} joint(s), stop has {len(self.stop)}; "
-                "they must be equal."
+                f"Move: start has {len(self.start)} joint(s), stop has {len(self.stop)}; they must be equal."
             )
 
     def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
@@ -135,9 +134,7 @@ class Step(AbstractReference):
     def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
         """Value for every joint at `t` [s]."""
         after = t >= self.begin
-        return tuple(
-            jnp.where(after, b, a) for a, b in zip(self.start, self.stop, strict=True)
-        )
+        return tuple(jnp.where(after, b, a) for a, b in zip(self.start, self.stop, strict=True))
 
     def jumps(self) -> Float[Array, " jumps"]:
         """The instant of the step [s]."""

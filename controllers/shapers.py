@@ -101,9 +101,7 @@ def zvdd(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0) -> Shaper:
     return _binomial(frequency, damping_ratio, 3)
 
 
-def ei(
-    frequency: ScalarLike, damping_ratio: ScalarLike = 0.0, tolerance: ScalarLike = 0.05
-) -> Shaper:
+def ei(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0, tolerance: ScalarLike = 0.05) -> Shaper:
     """Extra-insensitive, one hump (Singhose, Seering and Singer 1994).
 
     At the mode itself the share `tolerance` of the vibration is left, and in return none
@@ -132,9 +130,7 @@ def convolve(first: Shaper, second: Shaper) -> Shaper:
 CLASSICAL = {"ZV": zv, "ZVD": zvd, "ZVDD": zvdd, "EI": ei}
 
 
-def residual_ratio(
-    shaper: Shaper, frequency: ScalarLike, damping_ratio: ScalarLike = 0.0
-) -> Scalar:
+def residual_ratio(shaper: Shaper, frequency: ScalarLike, damping_ratio: ScalarLike = 0.0) -> Scalar:
     """Residual vibration of a mode with the shaper, as a share of that without.
 
     `exp(-zeta w t_n) |sum A_i exp((zeta w + j w_d) t_i)|` (Singer and Seering 1990), for

@@ -37,7 +37,6 @@ from .pd import PD
 from .references import Move
 from .shapers import Shaper
 
-
 GAINS = ("stiffness", "damping", "rate_feedforward", "acceleration_feedforward")
 
 

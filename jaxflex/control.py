@@ -84,7 +84,5 @@ class AbstractController(eqx.Module):
         """Command for every joint at time `t` [s]."""
 
     @abstractmethod
-    def rate(
-        self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
-    ) -> PyTree:
+    def rate(self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint) -> PyTree:
         """Time derivative of the memory, of the same structure."""

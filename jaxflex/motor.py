@@ -1,11 +1,11 @@
 r"""The permanent-magnet DC motor (Foldager et al. (1)-(7)).
 
-                R          L
-    V_a  o----/\/\/\----UUUUU----+
-                  i_a ->         |         T_m = K_m i_a
-                                (M) =====> gear 1:G, efficiency e =====> joint
-                                 |
-    0    o-----------------------+         V_b = K_b omega   (back-EMF)
+            R          L
+V_a  o----/\/\/\----UUUUU----+
+              i_a ->         |         T_m = K_m i_a
+                            (M) =====> gear 1:G, efficiency e =====> joint
+                             |
+0    o-----------------------+         V_b = K_b omega   (back-EMF)
 """
 
 import equinox as eqx

@@ -51,7 +51,11 @@ def plot_trajectory(trajectory: Trajectory, title: str = "") -> Figure:
     times = np.asarray(trajectory.times)
     for axis, kind in zip(axes.flat, shown, strict=False):
         for i, name in enumerate(sorted(groups[kind])):
-            label = name[-1] if kind == "tip" else f"{'link' if 'tip' in kind or kind == 'strain' else 'joint'} {name[-1]}"
+            label = (
+                name[-1]
+                if kind == "tip"
+                else f"{'link' if 'tip' in kind or kind == 'strain' else 'joint'} {name[-1]}"
+            )
             axis.plot(times, np.asarray(trajectory[name]), color=f"C{i}", label=label)
             reference = f"reference_{name[-1]}"
             if kind == "angle" and reference in trajectory.channels:
@@ -114,7 +118,9 @@ def plot_residual(
     axis = axes[0, 0]
     for i, (name, values) in enumerate(residual.items()):
         best = name == tuned
-        style = dict(color=AFTER, linewidth=2.6, zorder=5) if best else dict(color=f"C{i % 10}", linewidth=1.1)
+        style = (
+            dict(color=AFTER, linewidth=2.6, zorder=5) if best else dict(color=f"C{i % 10}", linewidth=1.1)
+        )
         if "tuned PD" in name:
             style["linestyle"] = "--"
         axis.semilogy(1e3 * payloads, 1e3 * values, label=name, **style)

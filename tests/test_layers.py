@@ -41,7 +41,9 @@ def modules():
             yield path, parts
 
 
-@pytest.mark.parametrize("path, parts", list(modules()), ids=lambda p: "/".join(p) if isinstance(p, tuple) else "")
+@pytest.mark.parametrize(
+    "path, parts", list(modules()), ids=lambda p: "/".join(p) if isinstance(p, tuple) else ""
+)
 def test_imports_run_downwards(path, parts):
     inside = parts[:-1] if parts[-1] == "__init__" else parts
     here = ".".join(inside)
@@ -74,5 +76,6 @@ def test_import_has_no_side_effects():
     import subprocess
     import sys
 
-    code = "import jaxflex, controllers, jax, os; assert not jax.config.jax_enable_x64; assert 'XLA_FLAGS' not in os.environ"
+    code = "import jaxflex, controllers, jax, os\nassert not jax.config.jax_enable_x64\n"
+    code += "assert 'XLA_FLAGS' not in os.environ"
     subprocess.run([sys.executable, "-c", code], check=True, env={"PATH": "", "PYTHONPATH": str(ROOT)})

@@ -30,7 +30,9 @@ def test_channels_agree_with_each_other():
     np.testing.assert_allclose(np.gradient(angle, t)[2:-2], trajectory["rate_1"][2:-2], atol=1e-4)
     np.testing.assert_allclose(trajectory["torque_1"], 0.062 * np.asarray(trajectory["current_1"]))
     model = arm.assemble()
-    bending = sum(np.asarray(k * e) for k, e in zip(model.links[0].gauge_curvature, trajectory.state.q[1:], strict=True))
+    bending = sum(
+        np.asarray(k * e) for k, e in zip(model.links[0].gauge_curvature, trajectory.state.q[1:], strict=True)
+    )
     np.testing.assert_allclose(trajectory["strain_1"], 1.4e-3 / 2 * bending, rtol=1e-12)
     assert trajectory.unit("strain_1") == "1" and trajectory.unit("tip_x") == "m"
 

@@ -13,9 +13,7 @@ from ..dynamics.lagrange import mass_matrix
 JointVector = Float[Array, " joints"]
 
 
-def undamped_frequencies(
-    stiffness: Float[Array, "n n"], mass: Float[Array, "n n"]
-) -> Float[Array, " n"]:
+def undamped_frequencies(stiffness: Float[Array, "n n"], mass: Float[Array, "n n"]) -> Float[Array, " n"]:
     """`f` [Hz] of `K v = (2 pi f)^2 M v`, ascending; rigid-body motions have zero."""
     factor = jnp.linalg.cholesky(mass)
     half = jax.scipy.linalg.solve_triangular(factor, stiffness, lower=True)

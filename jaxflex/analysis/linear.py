@@ -81,9 +81,7 @@ def linearise(
     closed = controller is not None
     law = controller if closed else _Commands()
     inputs = 3 * joints if closed else joints
-    rest = Plant(model, law, _Setpoint(Setpoint((), (), ())), None, None).rest(
-        tuple(scalar(a) for a in pose)
-    )
+    rest = Plant(model, law, _Setpoint(Setpoint((), (), ())), None, None).rest(tuple(scalar(a) for a in pose))
     flat, unflatten = ravel_pytree(rest)
     bias = tuple(pose) if closed else (scalar(0.0),) * joints
 

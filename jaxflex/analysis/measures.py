@@ -13,9 +13,7 @@ Series = Float[Array, " times"]
 Path = Float[Array, "times 2"]
 
 
-def residual_vibration(
-    times: Series, tip: Path, end: ScalarLike, rest: Float[Array, "2"]
-) -> Scalar:
+def residual_vibration(times: Series, tip: Path, end: ScalarLike, rest: Float[Array, "2"]) -> Scalar:
     """Peak-to-peak excursion of the tip [m] about its resting place after `end` [s].
 
     The diagonal of the smallest box, along the axes of the base frame, that holds the
@@ -25,7 +23,8 @@ def residual_vibration(
     """
     after = (times >= scalar(end))[:, None]
     away = jnp.where(after, tip - rest, 0.0)
-    square = jnp.sum((jnp.max(away, axis=0) - jnp.min(away, axis=0)) ** 2)
+    high, low = jnp.max(away, axis=0, initial=0.0), jnp.min(away, axis=0, initial=0.0)
+    square = jnp.sum((high - low) ** 2)
     return jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
 
 

@@ -43,9 +43,7 @@ class Pose(NamedTuple):
     heading: Scalar
 
 
-def velocities(
-    model: AssembledArm, q: tuple, qd: tuple
-) -> tuple[list[FrameVelocity], list[TipVelocity]]:
+def velocities(model: AssembledArm, q: tuple, qd: tuple) -> tuple[list[FrameVelocity], list[TipVelocity]]:
     """Velocities of every link's frame and tip, each along the axes of that link."""
     angles, etas = model.split(q)
     rates, eta_rates = model.split(qd)
@@ -63,9 +61,7 @@ def velocities(
         if i + 1 < len(model.links):
             turn = angles[i + 1] + dot(link.tip_slope, etas[i])
             c, s = jnp.cos(turn), jnp.sin(turn)
-            frame = FrameVelocity(
-                c * tip.x + s * tip.y, c * tip.y - s * tip.x, tip.rate + rates[i + 1]
-            )
+            frame = FrameVelocity(c * tip.x + s * tip.y, c * tip.y - s * tip.x, tip.rate + rates[i + 1])
     return frames, tips
 
 

@@ -97,7 +97,7 @@ def wave_numbers(ends: Ends, modes: int) -> Float[Array, " modes"]:
     positive = jax.vmap(frequency_equation, (0, None))(grid, fixed) > 0
     crossing = positive[1:] != positive[:-1]
     order = jnp.cumsum(crossing)
-    solver = optx.Bisection(rtol=4 * jnp.finfo(grid.dtype).eps, atol=0.0, flip="detect")
+    solver = optx.Bisection(rtol=4 * float(jnp.finfo(grid.dtype).eps), atol=0.0, flip="detect")
 
     def root(mode):
         found = crossing & (order == mode + 1)

@@ -55,9 +55,7 @@ def solve_mode_shapes(length: Scalar, ends: Ends, modes: int) -> ModeShapes:
         root, moment, shear = ends.conditions(z)
         # The null vector of a singular 3 x 3 matrix is the cross product of two of its rows;
         # of the three pairs, the one furthest from parallel is the accurate one.
-        pairs = jnp.stack(
-            [jnp.cross(root, moment), jnp.cross(root, shear), jnp.cross(moment, shear)]
-        )
+        pairs = jnp.stack([jnp.cross(root, moment), jnp.cross(root, shear), jnp.cross(moment, shear)])
         best = jnp.argmax(jnp.sum(pairs**2, axis=1))
         a, b, d = pairs[best]
         full = jnp.stack([a, b, -a - d * jnp.exp(-z), d])

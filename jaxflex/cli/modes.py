@@ -24,7 +24,9 @@ def modes(
     """Compute, print, draw and write."""
     arm = load_arm(arm_file) if arm_file else ahmad_arm()
     joints = len(arm.joints)
-    masses = [float(arm.payload.mass)] if payloads is None and arm_file else parse_payloads(payloads or "0:0.1:6")
+    masses = (
+        [float(arm.payload.mass)] if payloads is None and arm_file else parse_payloads(payloads or "0:0.1:6")
+    )
     angles = jnp.asarray(parse_numbers(pose, "--pose", joints) if pose else [0.0] * joints)
 
     def of_payload(mass):
@@ -72,7 +74,9 @@ def _controlled(arm: Arm, pose: jnp.ndarray) -> Table:
     bandwidth = None if arm.links and any(link.modes for link in arm.links) else 2 * np.pi
     linear = linearise(arm, pose, textbook_pd(arm, pose, bandwidth), ())
     found = closed_loop_modes(linear)
-    table = Table("as driven by the textbook PD, nominal payload", ["mode", "frequency [Hz]", "damping ratio"])
+    table = Table(
+        "as driven by the textbook PD, nominal payload", ["mode", "frequency [Hz]", "damping ratio"]
+    )
     for i, (f, z) in enumerate(zip(found.frequency.tolist(), found.damping_ratio.tolist(), strict=True), 1):
         table.rows.append([str(i), number(f, 4), number(z, 3)])
     return table

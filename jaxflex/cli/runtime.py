@@ -33,7 +33,7 @@ def prepare() -> None:
     imported, which is before a command line can set it, so its variable is set as well.
     """
     os.environ.setdefault("EQX_ON_ERROR", "nan")
-    equinox._errors.EQX_ON_ERROR = os.environ["EQX_ON_ERROR"]
+    setattr(equinox._errors, "EQX_ON_ERROR", os.environ["EQX_ON_ERROR"])  # noqa: B010
     folder = os.environ.get("JAXFLEX_CACHE", str(Path.home() / ".cache" / "jaxflex"))
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_compilation_cache_dir", folder)

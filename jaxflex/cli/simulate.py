@@ -8,7 +8,6 @@ import numpy as np
 from controllers import (
     BangBang,
     Design,
-    Move,
     OpenLoop,
     Sampled,
     Step,
@@ -24,7 +23,8 @@ from ..files.arm_file import read_arm_file
 from ..files.recording import read_recording
 from ..files.tables import write_series
 from ..plotting import plot_trajectory
-from ..simulation.simulate import InitialState, simulate as run
+from ..simulation.simulate import InitialState
+from ..simulation.simulate import simulate as run
 from .design_file import read_design
 from .runtime import UsageError, console, make_folder
 from .tables import number, write_json
@@ -55,7 +55,7 @@ def simulate(
         arm = arm.with_payload(payload)
     controller, reference, start, words = choose(arm, design, signal)
     length = float(duration or 1.5 * float(reference.end()) + 2.0)
-    times = jnp.linspace(0.0, length, int(round(length / dt)) + 1)
+    times = jnp.linspace(0.0, length, round(length / dt) + 1)
     console.print(f"[bold]{arm.name}[/], payload {1e3 * float(arm.payload.mass):.0f} g: {words}")
     trajectory = run(arm, controller, reference, times, initial=InitialState(angles=start))
     keep = [n for n in trajectory.channels if not n.startswith("tip_acceleration")]

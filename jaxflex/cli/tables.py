@@ -22,7 +22,9 @@ class Table:
 
     def rich(self) -> RichTable:
         """For the terminal."""
-        table = RichTable(title=self.title, title_justify="left", title_style="bold", box=None, padding=(0, 1, 0, 0))
+        table = RichTable(
+            title=self.title, title_justify="left", title_style="bold", box=None, padding=(0, 1, 0, 0)
+        )
         for i, column in enumerate(self.columns):
             table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
         for row in self.rows:

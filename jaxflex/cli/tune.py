@@ -3,6 +3,7 @@
 import dataclasses
 import time
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 
 import equinox as eqx
@@ -20,13 +21,14 @@ from controllers import (
     assess,
     classical_designs,
     default_move,
-    ringing_mode,
     stack,
     standard_start,
     textbook_pd,
-    tune as optimise,
     unshaped_design,
     with_payloads,
+)
+from controllers import (
+    tune as optimise,
 )
 
 from ..analysis.frequencies import locked_frequencies
@@ -167,7 +169,12 @@ def make_problem(arm: Arm, masses: list[float], path: Move) -> Problem:
 
 
 def _search(problem: Problem, steps: int, seed: int) -> Tuned:
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[best]}"),
+        TimeElapsedColumn(),
+    )
     live = console.is_terminal
     with Progress(*columns, console=console, disable=not live) as bar:
         tasks: dict[str, int] = {}
@@ -212,7 +219,7 @@ def compare(
     for name, design in classical_designs(arm, tuned.controller, path, total).items():
         designs[f"{name}, tuned PD"] = design
     designs[TUNED] = tuned
-    between = [(a + b) / 2 for a, b in zip(masses, masses[1:], strict=False)]
+    between = [(a + b) / 2 for a, b in pairwise(masses)]
     payloads = np.array(sorted(masses + between))
     held_out = ~np.isin(payloads, chosen)
     if not held_out.any():
@@ -302,7 +309,10 @@ def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict:
     links = sum(name.startswith("tip_deflection") for name in path.channels)
     bends = np.stack([np.asarray(path[f"tip_deflection_{i + 1}"]) for i in range(links)], axis=-1)
     on = ~comparison.held_out if (~comparison.held_out).any() else comparison.held_out
-    ends = tuple(float(comparison.designs[n].move_time()) for n in (UNTUNED, TUNED))
+    ends = (
+        float(comparison.designs[UNTUNED].move_time()),
+        float(comparison.designs[TUNED].move_time()),
+    )
     late = times >= max(ends)
     shake = path[f"tip_acceleration_{links}"][:, :, late]
     ours, theirs = (

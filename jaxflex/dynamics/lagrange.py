@@ -39,9 +39,7 @@ def coriolis_matrix(model: AssembledArm, q: Coordinates, qd: Coordinates) -> Mat
     Christoffel symbols of the first kind, which make `dM/dt - 2 C` skew.
     """
     slope = jax.jacfwd(mass_matrix, argnums=1)(model, q)  # slope[i, j, k] = dM_ij / dq_k
-    return 0.5 * (
-        slope @ qd + jnp.einsum("ikj,k->ij", slope, qd) - jnp.einsum("jki,k->ij", slope, qd)
-    )
+    return 0.5 * (slope @ qd + jnp.einsum("ikj,k->ij", slope, qd) - jnp.einsum("jki,k->ij", slope, qd))
 
 
 def gravity_vector(model: AssembledArm, q: Coordinates) -> Coordinates:

@@ -60,13 +60,9 @@ def parse_arm(table: dict[str, Any], file: str = "arm") -> ArmFile:
     if not isinstance(name, str):
         raise top.fail("name", f"found {name!r}; text in quotes is allowed.")
     gravity = top.number("gravity", 0.0, "a number", lambda x: True)
-    links = tuple(
-        _link(Fields(part, f"link {i}: ", file))
-        for i, part in enumerate(_tables(top, "link"), 1)
-    )
+    links = tuple(_link(Fields(part, f"link {i}: ", file)) for i, part in enumerate(_tables(top, "link"), 1))
     joints = tuple(
-        _joint(Fields(part, f"joint {i}: ", file), file, i)
-        for i, part in enumerate(_tables(top, "joint"), 1)
+        _joint(Fields(part, f"joint {i}: ", file), file, i) for i, part in enumerate(_tables(top, "joint"), 1)
     )
     if not joints:
         raise top.fail("joint", "missing; at least one [[joint]] is needed.")
@@ -193,9 +189,7 @@ def _motor(fields: Fields) -> DCMotor:
         # without inductance the current follows at once: it is then no state at all
         inductance=fields.not_negative("inductance") or None,
         gear_ratio=fields.number("gear_ratio", 1.0),
-        efficiency=fields.number(
-            "efficiency", 1.0, "a number above 0, at most 1", lambda x: 0 < x <= 1
-        ),
+        efficiency=fields.number("efficiency", 1.0, "a number above 0, at most 1", lambda x: 0 < x <= 1),
         voltage_limit=fields.number("voltage_limit"),
     )
     fields.finish()

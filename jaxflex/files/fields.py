@@ -39,7 +39,7 @@ class Fields:
         allowed: str = "a positive number",
         accept: Callable[[float], bool] = lambda x: x > 0,
         required: bool = False,
-    ) -> float | None:
+    ) -> Any:
         """A finite number that `accept` takes; `allowed` says in words which."""
         value = self.take(key)
         if value is None:
@@ -52,7 +52,7 @@ class Fields:
             raise self.fail(key, f"found {value!r}; {allowed} is allowed.")
         return float(value)
 
-    def not_negative(self, key: str, default: float | None = 0.0) -> float | None:
+    def not_negative(self, key: str, default: float | None = 0.0) -> Any:
         """A number of at least zero."""
         return self.number(key, default, "a number of at least 0", lambda x: x >= 0)
 

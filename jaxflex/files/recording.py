@@ -78,9 +78,7 @@ def read_recording(path: str | Path) -> Recording:
     for column in rows[0]:
         match = _HEADER.match(column)
         if match is None:
-            raise RecordingError(
-                f"{file}: column {column!r}: a header such as 'angle_1 [rad]' is needed."
-            )
+            raise RecordingError(f"{file}: column {column!r}: a header such as 'angle_1 [rad]' is needed.")
         name, given = match.groups()
         try:
             wanted = unit(name)
@@ -100,19 +98,15 @@ def read_recording(path: str | Path) -> Recording:
     values = np.full((len(rows) - 1, len(names)), np.nan)
     for i, row in enumerate(rows[1:]):
         if len(row) != len(names):
-            raise RecordingError(
-                f"{file}: row {i + 2}: found {len(row)} cells, the header has {len(names)}."
-            )
+            raise RecordingError(f"{file}: row {i + 2}: found {len(row)} cells, the header has {len(names)}.")
         for j, cell in enumerate(row):
             if cell.strip():
                 try:
                     values[i, j] = float(cell)
                 except ValueError:
-                    raise RecordingError(
-                        f"{file}: row {i + 2}, {names[j]}: {cell!r} is no number."
-                    ) from None
+                    raise RecordingError(f"{file}: row {i + 2}, {names[j]}: {cell!r} is no number.") from None
     values = values * np.asarray(scales)
-    whole = np.isfinite(values).all(axis=1)
+    whole = np.asarray(np.isfinite(values).all(axis=1))
     repairs = ()
     if not whole.all():
         repairs = (f"{int((~whole).sum())} of {len(whole)} rows hold a gap or NaN and were left out",)

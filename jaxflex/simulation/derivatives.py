@@ -55,7 +55,7 @@ def both_modes(forward: Callable[[PyTree], PyTree], reverse: Callable[[PyTree], 
             return jtu.tree_map(jnp.zeros_like, t), pushed
 
         def pull(_, b):
-            t, cotangent = b
+            _, cotangent = b
             _, vjp = jax.vjp(lambda a: through(reverse, a), active)
             return vjp(cotangent)[0], jtu.tree_map(jnp.zeros_like, cotangent)
 

@@ -1,5 +1,8 @@
 """How a simulation steps: adaptive, fixed step, and the sample-and-hold that wraps either."""
 
+# diffrax hands its solvers and controllers scalars that it types more loosely than they are
+# pyright: reportArgumentType=false, reportCallIssue=false
+
 from abc import abstractmethod
 
 import diffrax
@@ -51,7 +54,9 @@ class Adaptive(AbstractMethod):
             rtol=self.rtol, atol=self.atol, pcoeff=0.2, icoeff=0.5, dtmin=SMALLEST_STEP
         )
         clipped = diffrax.ClipStepSizeController(pid, jump_ts=jumps)
-        return clipped if period is None else _ClipToSamples(clipped, start, period)
+        if period is None:
+            return clipped
+        return _ClipToSamples(inner=clipped, start=start, period=period)
 
     def first_step(self) -> Scalar | None:
         """Chosen by the solver."""

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..arm.arm import Arm, AssembledArm
@@ -83,7 +84,7 @@ def simulate(
     method = Adaptive() if method is None else method
     wanted = _wanted(plant, channels)
     inputs = (plant, start, times, method, wanted, max_steps, adjoint)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(inputs)):
+    if any(isinstance(leaf, Tracer) for leaf in jtu.tree_leaves(inputs)):
         return _integrate(*inputs)
     return eqx.filter_jit(_integrate)(*inputs).check()
 
@@ -189,7 +190,7 @@ def _integrate(
         states, status, steps, rejected = differentiable(inputs)
     else:
         states, status, steps, rejected = solve(inputs, adjoint)
-    lost = jax.vmap(lambda q: has_diverged(plant.model, q))(states.q).any()
+    lost = jax.vmap(lambda q: has_diverged(plant.model, q))(states.q).any()  # pyright: ignore
     status = jnp.where((status == OK) & lost, DIVERGED, status)
     # a failed member is blanked before the channels are read, so that nothing after its
     # failure is taken for a measurement

@@ -1,9 +1,9 @@
 """The result of a simulation: named channels, how the solver fared, and whether to trust it."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from ..sensors import unit
@@ -46,7 +46,7 @@ class Trajectory(eqx.Module):
         return self.channels[channel]
 
     def __repr__(self) -> str:
-        if isinstance(self.status, jax.core.Tracer):
+        if isinstance(self.status, Tracer):
             return f"Trajectory(channels={list(self.channels)}, traced)"
         failed = int(np.sum(np.asarray(self.status) != OK))
         batch = f"batch {self.status.shape}, " if self.status.ndim else ""

@@ -48,7 +48,9 @@ def test_one_way_model_is_the_coupled_one_with_a_heavy_hub():
     link = jf.Link(0.5, 0.2, 1.0, damping_ratio=damping, modes=3, mode_shapes="clamped_free")
     light = jf.Arm((link,), (jf.Joint(hub_inertia=1.0),))
     basis = link.basis(light.distal(0), False)
-    model = assumed_modes_link(basis, link.mass_per_length, link.flexural_rigidity, link.damping_ratio, link.gauge_position)
+    model = assumed_modes_link(
+        basis, link.mass_per_length, link.flexural_rigidity, link.damping_ratio, link.gauge_position
+    )
     one_way = jf.OneWayLink(model)
     s = 1j * jnp.array([5.0, 20.0, 60.0, 150.0])
     expected = one_way.tip_over_angle(s)
@@ -80,6 +82,11 @@ def test_one_way_ode_and_voltage_transfer():
     # (9) under a hub acceleration exp(s t): eta = H exp(s t), tip = sum psi eta
     w = 30.0
     rows = one_way.accelerations((0.0, 0.0), (0.0, 0.0), jnp.array(1.0))
-    eta = [r / (-(w**2) + k / m[i] + 1j * w * d / m[i]) for i, (r, k, m, d) in enumerate(zip(rows, model.stiffness, model.modal_inertia, model.damping, strict=True))]
+    eta = [
+        r / (-(w**2) + k / m[i] + 1j * w * d / m[i])
+        for i, (r, k, m, d) in enumerate(
+            zip(rows, model.stiffness, model.modal_inertia, model.damping, strict=True)
+        )
+    ]
     tip = sum(p * e for p, e in zip(model.tip_deflection, eta, strict=True))
     np.testing.assert_allclose(tip, one_way.tip_over_angle(s)[0] / s[0] ** 2, rtol=1e-9)

@@ -16,6 +16,8 @@ def test_residual_vibration_of_a_sine():
     np.testing.assert_allclose(
         jf.residual_vibration(T, tip * 0 + rest, 4.0, rest + jnp.array([0.3, 0.4])), 0.5, rtol=1e-6
     )
+    beside = rest + jnp.array([0.3, 0.4])
+    np.testing.assert_allclose(jf.residual_vibration(T, tip * 0 + rest, -1.0, beside), 0.5, rtol=1e-6)
     assert jf.residual_vibration(T, tip * 0 + rest, 4.0, rest) == 0.0
     slope = jax.grad(lambda s: jf.residual_vibration(T, rest + s * (tip - rest), 4.0, rest))
     np.testing.assert_allclose(slope(1.0), 0.1, rtol=1e-5)

@@ -13,9 +13,7 @@ PAYLOADS = [0.0, 0.02, 0.1]
 
 
 def reference(payload, angles, locked):
-    return frame_frequencies(
-        [0.5, 0.5], 0.2, 1.0, angles, [0.02, 0.02], [0.0, 1.0], (payload, 0.0), locked
-    )
+    return frame_frequencies([0.5, 0.5], 0.2, 1.0, angles, [0.02, 0.02], [0.0, 1.0], (payload, 0.0), locked)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.6, 1.5708, 2.5])
@@ -63,7 +61,9 @@ def test_shapes_are_tangent_orthogonal_and_scaled(kind):
 def test_gradients_of_frequencies():
     def lowest(payload, length, rigidity):
         arm = ahmad_arm(payload)
-        links = tuple(dataclasses.replace(link, length=length, flexural_rigidity=rigidity) for link in arm.links)
+        links = tuple(
+            dataclasses.replace(link, length=length, flexural_rigidity=rigidity) for link in arm.links
+        )
         arm = dataclasses.replace(arm, links=links)
         return locked_frequencies(arm)[1] + driven_frequencies(arm)[3]
 

@@ -109,7 +109,9 @@ def test_mode_shapes_meet_their_ends(ends):
         np.testing.assert_allclose(slope_0 / z, 0.0, atol=1e-9)
     else:
         spring = float(ends.root_stiffness) - z**4 * float(ends.hub_inertia)
-        np.testing.assert_allclose(curvature_0 / z**2, spring * slope_0 / z**2, atol=1e-6 * np.max(np.abs(spring)) + 1e-8)
+        np.testing.assert_allclose(
+            curvature_0 / z**2, spring * slope_0 / z**2, atol=1e-6 * np.max(np.abs(spring)) + 1e-8
+        )
 
 
 def test_works_under_vmap_and_jit():

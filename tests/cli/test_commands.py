@@ -34,7 +34,22 @@ def test_modes_of_the_built_in_arm(tmp_path):
 
 
 def test_simulate_writes_csv_json_and_figure(tmp_path):
-    result = run("simulate", LINK, "--payload", 0.01, "--input", "step", "--duration", 0.2, "--dt", 0.01, "--json", tmp_path / "r.json", "-o", tmp_path)
+    result = run(
+        "simulate",
+        LINK,
+        "--payload",
+        0.01,
+        "--input",
+        "step",
+        "--duration",
+        0.2,
+        "--dt",
+        0.01,
+        "--json",
+        tmp_path / "r.json",
+        "-o",
+        tmp_path,
+    )
     assert result.exit_code == 0, result.output
     recording = jf.read_recording(tmp_path / "run.csv")
     for name in ("angle_1", "tip_deflection_1", "tip_x", "tip_y", "voltage_1"):
@@ -42,7 +57,18 @@ def test_simulate_writes_csv_json_and_figure(tmp_path):
     assert json.loads((tmp_path / "r.json").read_text())["largest"]["angle_1"] > 0
     assert (tmp_path / "run.png").stat().st_size > 10_000
     # what it wrote drives the arm again
-    again = run("simulate", LINK, "--payload", 0.01, "--input", tmp_path / "run.csv", "--duration", 0.2, "-o", tmp_path / "b")
+    again = run(
+        "simulate",
+        LINK,
+        "--payload",
+        0.01,
+        "--input",
+        tmp_path / "run.csv",
+        "--duration",
+        0.2,
+        "-o",
+        tmp_path / "b",
+    )
     assert again.exit_code == 0, again.output
 
 

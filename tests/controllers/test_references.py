@@ -5,7 +5,12 @@ import pytest
 
 from controllers import BangBang, Move, Quintic, Sampled, SCurve, Shaped, Step, Trapezoid, zvd
 
-PROFILES = {"quintic": Quintic(), "trapezoid": Trapezoid(0.2), "bang-bang": Trapezoid(0.5), "s-curve": SCurve()}
+PROFILES = {
+    "quintic": Quintic(),
+    "trapezoid": Trapezoid(0.2),
+    "bang-bang": Trapezoid(0.5),
+    "s-curve": SCurve(),
+}
 
 
 @pytest.mark.parametrize("name", list(PROFILES))
@@ -39,7 +44,9 @@ def test_setpoint_is_the_derivative_in_time():
         values = [float(move(t + k * h)[j]) for k in (-1, 0, 1)]
         np.testing.assert_allclose(setpoint.value[j], values[1])
         np.testing.assert_allclose(setpoint.rate[j], (values[2] - values[0]) / (2 * h), rtol=1e-6)
-        np.testing.assert_allclose(setpoint.acceleration[j], (values[2] - 2 * values[1] + values[0]) / h**2, rtol=1e-5)
+        np.testing.assert_allclose(
+            setpoint.acceleration[j], (values[2] - 2 * values[1] + values[0]) / h**2, rtol=1e-5
+        )
     np.testing.assert_allclose(move(jnp.array(9.0)), (0.5, -0.3))
     assert move.end() == 2.5 and list(move.jumps()) == [0.5, 2.5]
 

@@ -56,7 +56,10 @@ def test_closed_form_residual_is_that_of_an_oscillator():
         return np.exp(-zeta * omega * t) * np.exp(1j * damped * t)
 
     end = float(shaper.duration())
-    total = sum(a * ring(end - t) for a, t in zip(np.asarray(shaper.amplitudes), np.asarray(shaper.delays), strict=True))
+    total = sum(
+        a * ring(end - t)
+        for a, t in zip(np.asarray(shaper.amplitudes), np.asarray(shaper.delays), strict=True)
+    )
     np.testing.assert_allclose(residual_ratio(shaper, f, zeta), abs(total), rtol=1e-12)
 
 
@@ -88,5 +91,7 @@ def test_padding_changes_nothing():
 def test_settings_have_gradients():
     slope = jax.grad(lambda f: residual_ratio(zvd(f, 0.05), 1.2, 0.05))
     h = 1e-6
-    difference = (residual_ratio(zvd(1.0 + h, 0.05), 1.2, 0.05) - residual_ratio(zvd(1.0 - h, 0.05), 1.2, 0.05)) / (2 * h)
+    difference = (
+        residual_ratio(zvd(1.0 + h, 0.05), 1.2, 0.05) - residual_ratio(zvd(1.0 - h, 0.05), 1.2, 0.05)
+    ) / (2 * h)
     np.testing.assert_allclose(slope(1.0), difference, rtol=1e-6)

@@ -62,7 +62,13 @@ def problem():
 
 def test_textbook_pd_is_critically_damped_for_the_rigid_arm(problem):
     arm, gains = problem.arm, problem.start
-    rigid = jf.Arm((jf.Link(0.395, float(arm.links[0].mass_per_length), 1.0, modes=0),), arm.joints, arm.payload, None, "voltage")
+    rigid = jf.Arm(
+        (jf.Link(0.395, float(arm.links[0].mass_per_length), 1.0, modes=0),),
+        arm.joints,
+        arm.payload,
+        None,
+        "voltage",
+    )
     motor = jf.DCMotor(1.2, 0.062, 0.062)  # without inductance, as the rule assumes
     joint = jf.Joint(hub_inertia=1.1e-4, viscous_friction=2e-4, motor=motor)
     rigid = jf.Arm(rigid.links, (joint,), arm.payload, None, "voltage")
@@ -79,7 +85,7 @@ def test_designs_last_equally_long(problem):
     design = problem.design(standard_start(problem))
     np.testing.assert_allclose(design.move_time(), total, rtol=1e-9)
     frequency, ratio = ringing_mode(problem.arm, jnp.stack(problem.move.stop), problem.start)
-    assert 0 < float(frequency) and 0 <= float(ratio) < 0.7
+    assert float(frequency) > 0 and 0 <= float(ratio) < 0.7
 
 
 def test_gradient_of_the_cost_matches_finite_differences(problem):
@@ -99,7 +105,14 @@ def test_gradient_of_the_cost_matches_finite_differences(problem):
 
 def test_tuning_beats_the_textbook_on_payloads_it_never_saw(problem):
     seen = []
-    tuned = tune(problem, standard_start(problem), starts=3, max_steps=25, descents=1, progress=lambda *a: seen.append(a))
+    tuned = tune(
+        problem,
+        standard_start(problem),
+        starts=3,
+        max_steps=25,
+        descents=1,
+        progress=lambda *a: seen.append(a),
+    )
     minimum = tuned.minima[0]
     assert minimum.history[-1] < minimum.history[0] - 1.0 and minimum.steps == len(minimum.history)
     assert "converged" in minimum.reason and {what for what, _, _ in seen} == {"starts", "descent 1"}

@@ -58,7 +58,11 @@ def test_reads_what_it_says():
         ("length = 0.4", 'length = 0.4\nmodel = "lumped"\nsegments = 1', "at most segments = 1"),
         ("length = 0.4", "length = 0.4\ngauge_position = 0.5", "a number from 0 to the length"),
         ("density = 2700.0", "", "link 1: density: missing"),
-        ("hub_inertia = 1e-4", "hub_inertia = -1e-4", "joint 1: hub_inertia: found -0.0001; a number of at least 0"),
+        (
+            "hub_inertia = 1e-4",
+            "hub_inertia = -1e-4",
+            "joint 1: hub_inertia: found -0.0001; a number of at least 0",
+        ),
         ("resistance = 1.2", "", "joint 1: motor: resistance: missing"),
         ("resistance = 1.2", "resistance = 1.2\nefficiency = 1.2", "a number above 0, at most 1"),
         ("[[joint]]", "[joint]", "found one \\[joint\\] table; write \\[\\[joint\\]\\]"),
@@ -66,9 +70,21 @@ def test_reads_what_it_says():
         ('name = "an arm"', "speed = 3", "arm.toml: speed: unknown key"),
         ('name = "an arm"', 'drive = {input = "steam"}', "drive: input: found 'steam'; allowed are"),
         ('name = "an arm"', "payload = 3", "payload: : found 3|payload"),
-        ('name = "an arm"', 'effect = [{name = "magic", location = "joint_1"}]', "effect 1: name: found 'magic'"),
-        ('name = "an arm"', 'effect = [{name = "coulomb_friction", location = "joint_2", torque = 1}]', "joint_2"),
-        ('name = "an arm"', 'effect = [{name = "coulomb_friction", location = "joint_1"}]', "torque: missing"),
+        (
+            'name = "an arm"',
+            'effect = [{name = "magic", location = "joint_1"}]',
+            "effect 1: name: found 'magic'",
+        ),
+        (
+            'name = "an arm"',
+            'effect = [{name = "coulomb_friction", location = "joint_2", torque = 1}]',
+            "joint_2",
+        ),
+        (
+            'name = "an arm"',
+            'effect = [{name = "coulomb_friction", location = "joint_1"}]',
+            "torque: missing",
+        ),
         ('name = "an arm"', "uncertainty = {warmth = 0.1}", "uncertainty: warmth: unknown key"),
     ],
 )

@@ -93,7 +93,9 @@ def test_both_modes_is_one_linear_map_under_vmap():
     np.testing.assert_allclose(jax.vmap(jax.grad(call))(a, b), jnp.cos(a) * b)
     np.testing.assert_allclose(jax.grad(lambda a: jax.vmap(call)(a, b).sum())(a), jnp.cos(a) * b)
     np.testing.assert_allclose(jax.jacfwd(lambda a: jax.vmap(call)(a, b))(a), jnp.diag(jnp.cos(a) * b))
-    np.testing.assert_allclose(jax.jit(jax.jvp, static_argnums=0)(call, (a[1], b[1]), (0.0, 1.0))[1], jnp.sin(a[1]))
+    np.testing.assert_allclose(
+        jax.jit(jax.jvp, static_argnums=0)(call, (a[1], b[1]), (0.0, 1.0))[1], jnp.sin(a[1])
+    )
 
 
 def test_second_derivatives_are_refused_not_zero():

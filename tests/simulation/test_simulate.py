@@ -79,9 +79,7 @@ def test_sampled_control_is_the_exact_zero_order_hold():
     arm = jf.Arm((), (jf.Joint(hub_inertia=inertia, viscous_friction=friction),))
     kp, kd = 2.0, 0.15
     times = jnp.arange(0.0, 0.5, period)
-    run = jf.simulate(
-        arm, PD((kp,), (kd,)), Step((0.0,), (1.0,)), times, sample_time=period, method=TIGHT
-    )
+    run = jf.simulate(arm, PD((kp,), (kd,)), Step((0.0,), (1.0,)), times, sample_time=period, method=TIGHT)
     a = friction / inertia
     e = np.exp(-a * period)
     ad = np.array([[1, (1 - e) / a], [0, e]])
@@ -114,7 +112,9 @@ def test_sampling_fast_is_continuous_control():
 
 
 def test_initial_states_disturbance_and_saturation():
-    arm = jf.Arm((), (jf.Joint(hub_inertia=0.5, motor=jf.DCMotor(1.0, 0.5, 0.0, voltage_limit=2.0)),), drive="voltage")
+    arm = jf.Arm(
+        (), (jf.Joint(hub_inertia=0.5, motor=jf.DCMotor(1.0, 0.5, 0.0, voltage_limit=2.0)),), drive="voltage"
+    )
     start = jf.InitialState(angles=jnp.array([0.2]), rates=jnp.array([1.0]))
     run = jf.simulate(
         arm, OpenLoop(), Step((10.0,), (10.0,)), TIMES, initial=start, disturbance=Step((0.0,), (0.25,), 0.5)
@@ -186,8 +186,12 @@ def test_bad_member_of_a_batch_is_named_and_the_others_are_kept():
     arm = jf.foldager_link(0.0, modes=1)
     times = jnp.linspace(0.0, 1.0, 11)
     gains = jnp.array([5.0, -50.0, 8.0])
-    runs = eqx.filter_jit(eqx.filter_vmap(lambda k: jf.simulate(arm, PD((k,), (0.2,)), Step((0.0,), (0.1,)), times)))(gains)
-    with pytest.raises(jf.SimulationError, match="1 of 3 simulations failed:\n  member 1: the arm diverged") as caught:
+    runs = eqx.filter_jit(
+        eqx.filter_vmap(lambda k: jf.simulate(arm, PD((k,), (0.2,)), Step((0.0,), (0.1,)), times))
+    )(gains)
+    with pytest.raises(
+        jf.SimulationError, match="1 of 3 simulations failed:\n  member 1: the arm diverged"
+    ) as caught:
         runs.check()
     kept = caught.value.trajectory
     assert caught.value.members == [(1,)]
