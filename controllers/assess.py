@@ -65,7 +65,7 @@ def run(
         design.reference,
         times,
         initial=InitialState(angles=jnp.stack(design.move.start)),
-        method=method or Adaptive(rtol=1e-6, atol=1e-8, solver=diffrax.Bosh3()),
+        method=method or Adaptive(rtol=1e-6, atol=1e-8, solver=diffrax.Bosh3(), stability=None),
         channels=channels,
     )
 

@@ -134,13 +134,13 @@ def stack(designs: list[Design]) -> Design:
 def default_move(arm: Arm) -> Move:
     """A move that makes the arm ring: 0.8 rad of the first joint, 0.5 rad of the others, quintic.
 
-    It takes one period of the lowest frequency with the joints locked, or longer where
+    It takes 1.1 periods of the lowest frequency with the joints locked, or longer where
     the rigid arm would need more than half of the voltage limit.
     """
     stop = tuple(0.8 if i == 0 else 0.5 for i in range(len(arm.joints)))
     pose = jnp.asarray(stop)
     locked = locked_frequencies(arm, pose)
-    duration = 1 / locked[0] if locked.shape[0] else scalar(1.0)
+    duration = 1.1 / locked[0] if locked.shape[0] else scalar(1.0)
     gains = textbook_pd(arm, pose, 1.0, feedforward=True)
     for i, joint in enumerate(arm.joints):
         if joint.motor is None or joint.motor.voltage_limit is None or arm.drive != "voltage":

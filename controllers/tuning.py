@@ -161,7 +161,7 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
             times,
             initial=InitialState(angles=jnp.stack(move.start)),
             # stability, not accuracy, sets the step here: a solver of few stages is the cheaper
-            method=Adaptive(rtol=1e-5, atol=1e-7, solver=diffrax.Bosh3()),
+            method=Adaptive(rtol=1e-5, atol=1e-7, solver=diffrax.Bosh3(), stability=None),
             channels=wanted,
             max_steps=50_000,
             adjoint=diffrax.ForwardMode(),

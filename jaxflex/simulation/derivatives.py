@@ -42,7 +42,11 @@ def both_modes(forward: Callable[[PyTree], PyTree], reverse: Callable[[PyTree], 
         def through(function, a):
             return eqx.filter(function(eqx.combine(a, rest)), eqx.is_inexact_array)
 
-        blank = jtu.tree_map(jnp.zeros_like, eqx.filter(out, eqx.is_inexact_array))
+        # zeros, but linear in the tangent, as all that a linear solve is given has to be
+        nothing = sum(0 * jnp.sum(t) for t in jtu.tree_leaves(tangent))
+        blank = jtu.tree_map(
+            lambda leaf: jnp.zeros_like(leaf) + nothing, eqx.filter(out, eqx.is_inexact_array)
+        )
         guard = jtu.tree_leaves(active)[0]
 
         def identity(b):

@@ -17,6 +17,7 @@ from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
 from .methods import AbstractMethod, Adaptive, SampleAndHold, sample
 from .plant import Plant, State, derivative
+from .stiffness import fastest_rate
 from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
 
 
@@ -156,7 +157,11 @@ def _integrate(
         t0 = times[0]
         solver = method.solver
         if plant.sample_time is not None:
+            if isinstance(adjoint, diffrax.ForwardMode) and hasattr(solver, "scan_kind"):
+                # diffrax sets this itself, but not inside a wrapper
+                solver = eqx.tree_at(lambda s: s.scan_kind, solver, "lax", is_leaf=lambda x: x is None)
             solver = SampleAndHold(solver, t0)
+        fastest = fastest_rate(t0, start, plant) if method.needs_fastest() else None
         solution = diffrax.diffeqsolve(
             diffrax.ODETerm(derivative),
             solver,
@@ -166,7 +171,7 @@ def _integrate(
             start,
             args=plant,
             saveat=diffrax.SaveAt(ts=times),
-            stepsize_controller=method.controller(jumps, t0, plant.sample_time),
+            stepsize_controller=method.controller(jumps, t0, plant.sample_time, fastest),
             adjoint=adjoint,
             event=diffrax.Event(lambda t, y, args, **_: has_diverged(args.model, y.q)),
             max_steps=max_steps,

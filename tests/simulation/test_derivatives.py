@@ -102,4 +102,20 @@ def test_second_derivatives_are_refused_not_zero():
     f = both_modes(lambda x: x**3, lambda x: x**3)
     for second in (jax.grad(jax.grad(f)), jax.jacfwd(jax.grad(f)), jax.jacfwd(jax.jacfwd(f))):
         with pytest.raises(Exception, match="cannot be autodifferentiated"):
-            second(2.0)
+            second(jnp.array(2.0))
+
+
+def test_fastest_rate_is_that_of_the_linear_model():
+    from jaxflex.simulation.plant import Plant
+    from jaxflex.simulation.stiffness import fastest_rate
+
+    for arm, gains in (
+        (jf.foldager_link(0.02), PD((10.0,), (0.3,))),
+        (jf.ahmad_arm(0.05), PD((3.0, 0.4), (9.0, 0.8))),
+    ):
+        joints = len(arm.joints)
+        reference = Step((0.0,) * joints, (0.0,) * joints)
+        plant = Plant(arm.assemble(), gains, reference, None, None)
+        estimate = fastest_rate(jnp.zeros(()), plant.rest((jnp.zeros(()),) * joints), plant)
+        poles = np.linalg.eigvals(np.asarray(jf.linearise(arm, jnp.zeros(joints), gains, ()).A))
+        np.testing.assert_allclose(estimate, np.abs(poles).max(), rtol=0.25)
