@@ -30,7 +30,7 @@ def tune(
     payloads: Annotated[str, typer.Option(help="kg, FIRST:LAST:COUNT or A,B,…")] = "0:0.1:6",
     move: Annotated[Optional[str], typer.Option(help="Target of every joint, rad, A,B,…")] = None,
     duration: Annotated[Optional[float], typer.Option(help="Duration of the unshaped move, s.")] = None,
-    steps: Annotated[int, typer.Option(help="Steps of the search.")] = 60,
+    steps: Annotated[int, typer.Option(help="Steps of the search.")] = 48,
     seed: Annotated[int, typer.Option(help="Seed of the scattered starts.")] = 0,
     json: Json = None,
     output: Output = None,

@@ -60,7 +60,7 @@ def test_current_and_torque_drives():
 def test_no_inductance_is_the_limit_of_little():
     times = jnp.linspace(0.0, 0.3, 31)
     runs = []
-    for inductance in (None, 1e-6):
+    for inductance in (None, 1e-5):
         motor = DCMotor(1.2, 0.062, 0.062, inductance=inductance)
         runs.append(jf.simulate(arm(motor), OpenLoop(), Step((0.0,), (6.0,)), times)["rate_1"])
     np.testing.assert_allclose(runs[0], runs[1], atol=0.02)
