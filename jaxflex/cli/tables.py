@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table as RichTable
 
 
@@ -23,10 +24,10 @@ class Table:
     def rich(self) -> RichTable:
         """For the terminal."""
         table = RichTable(
-            title=self.title, title_justify="left", title_style="bold", box=None, padding=(0, 1, 0, 0)
+            title=escape(self.title), title_justify="left", title_style="bold", box=None, padding=(0, 1, 0, 0)
         )
         for i, column in enumerate(self.columns):
-            table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+            table.add_column(escape(column), justify="left" if i == 0 else "right", no_wrap=True)
         for row in self.rows:
             table.add_row(*row, style="bold green" if row[0] == self.best else None)
         return table
