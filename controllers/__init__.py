@@ -26,6 +26,7 @@ from .minimise import Minimum as Minimum
 from .minimise import minimise as minimise
 
 # Feedback
+from .pd import GAINS as GAINS
 from .pd import PD as PD
 from .pd import OpenLoop as OpenLoop
 from .references import AbstractProfile as AbstractProfile

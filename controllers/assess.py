@@ -1,6 +1,5 @@
 """How a design fares on an arm: the measures that `tune` compares, over payloads."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import diffrax
@@ -53,11 +52,12 @@ def run(
     arm: Arm,
     times: Float[Array, " times"],
     method: AbstractMethod | None = None,
-    channels: Sequence[str] | None = None,
+    **options,
 ) -> Trajectory:
     """`arm` from rest at the start of the design's move, until the last of `times` [s].
 
-    The default method suits loops in which stability sets the step.
+    The default method suits loops in which stability sets the step; `options` as for
+    `simulate`.
     """
     return simulate(
         arm,
@@ -66,7 +66,7 @@ def run(
         times,
         initial=InitialState(angles=jnp.stack(design.move.start)),
         method=method or Adaptive(rtol=1e-6, atol=1e-8, solver=diffrax.Bosh3(), stability=None),
-        channels=channels,
+        **options,
     )
 
 

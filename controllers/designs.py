@@ -52,14 +52,15 @@ def textbook_pd(
     Each joint is taken alone with the inertia J that it turns when the links are rigid,
     so that `J s^2 + (b + K_m K_b / R + K_m K_omega / R) s + K_m K_theta / R` has a
     double pole at `bandwidth` [rad/s]; without one given, at a third of the lowest
-    frequency with the joints locked, so that the links hardly feel the controller. A
-    damping gain that back-EMF makes needless is zero.
+    frequency with the joints locked, so that the links hardly feel the controller (1 Hz
+    where no link bends). A damping gain that back-EMF makes needless is zero.
 
     With `feedforward`, the voltage that the same rigid joint needs to follow the
     reference: `R b / K_m + K_b` on its rate and `R J / K_m` on its acceleration.
     """
     if bandwidth is None:
-        bandwidth = 2 * jnp.pi * locked_frequencies(arm, pose)[0] / 3
+        locked = locked_frequencies(arm, pose)
+        bandwidth = 2 * jnp.pi * (locked[0] / 3 if locked.shape[0] else 1.0)
     omega = scalar(bandwidth)
     n = len(arm.joints)
     model = arm.assemble()

@@ -9,6 +9,8 @@ from jaxflex import AbstractController, Measurement, Scalar, ScalarLike, Setpoin
 
 from .references import scalars
 
+GAINS = ("stiffness", "damping", "rate_feedforward", "acceleration_feedforward")
+
 Gains = ScalarLike | Sequence[ScalarLike]
 
 

@@ -8,7 +8,6 @@ from abc import abstractmethod
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -218,9 +217,3 @@ class Sampled(AbstractReference):
     def end(self) -> Scalar:
         """Time of the last sample [s]."""
         return self.times[-1]
-
-
-def peak_rate(reference: AbstractReference, times: Float[Array, " times"]) -> Float[Array, " joints"]:
-    """Largest rate [rad/s] of every joint's reference over `times` [s]."""
-    rates = jax.vmap(lambda t: jnp.stack(reference.setpoint(t).rate))(times)
-    return jnp.max(jnp.abs(rates), axis=0)

@@ -20,24 +20,19 @@ from jaxtyping import Array, Float
 from jaxflex import (
     Adaptive,
     Arm,
-    InitialState,
     Scalar,
-    ScalarLike,
     residual_vibration,
     scalar,
-    simulate,
     tip_position,
 )
 
-from .assess import with_payloads
+from .assess import run, with_payloads
 from .bijections import AbstractBijection, Delays, Interval, Simplex
 from .designs import Design, with_duration
 from .minimise import Minimum, make_stepper, minimise
-from .pd import PD
+from .pd import GAINS, PD
 from .references import Move
 from .shapers import Shaper
-
-GAINS = ("stiffness", "damping", "rate_feedforward", "acceleration_feedforward")
 
 
 class Weights(eqx.Module):
@@ -154,12 +149,10 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
     wanted += [f"tip_deflection_{i}" for i in bending]
 
     def one(arm):
-        trajectory = simulate(
+        trajectory = run(
+            design,
             arm,
-            design.controller,
-            design.reference,
             times,
-            initial=InitialState(angles=jnp.stack(move.start)),
             # stability, not accuracy, sets the step here: a solver of few stages is the cheaper
             method=Adaptive(rtol=1e-5, atol=1e-7, solver=diffrax.Bosh3(), stability=None),
             channels=wanted,
@@ -284,8 +277,3 @@ def standard_start(problem: Problem) -> dict[str, Array]:
         "delays": jnp.linspace(0.0, 1.0, n),
         "share": (problem.shaper_time / problem.total_time())[None],
     }
-
-
-def shaper_time(frequency: ScalarLike, damping_ratio: ScalarLike) -> Scalar:
-    """One damped period [s] of a mode: what a ZVD shaper takes, and the tuned one is given."""
-    return 1 / (scalar(frequency) * jnp.sqrt(1 - scalar(damping_ratio) ** 2))

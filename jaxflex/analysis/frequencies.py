@@ -1,12 +1,12 @@
 """Natural frequencies of an arm, its joints free, locked or held by springs."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..arm.arm import Arm, AssembledArm
 from ..beam.basis import make_basis
+from ..beam.eigen import whiten
 from ..beam.mode_shapes import natural_frequencies as beam_frequencies
 from ..dynamics.lagrange import mass_matrix
 
@@ -15,10 +15,7 @@ JointVector = Float[Array, " joints"]
 
 def undamped_frequencies(stiffness: Float[Array, "n n"], mass: Float[Array, "n n"]) -> Float[Array, " n"]:
     """`f` [Hz] of `K v = (2 pi f)^2 M v`, ascending; rigid-body motions have zero."""
-    factor = jnp.linalg.cholesky(mass)
-    half = jax.scipy.linalg.solve_triangular(factor, stiffness, lower=True)
-    whitened = jax.scipy.linalg.solve_triangular(factor, half.T, lower=True)
-    values = jnp.linalg.eigvalsh((whitened + whitened.T) / 2)
+    values = jnp.linalg.eigvalsh(whiten(mass, stiffness)[1])
     # rounding leaves a rigid body a square of either sign, and a root there has no slope
     elastic = values > 1e-13 * values[-1]
     return jnp.where(elastic, jnp.sqrt(jnp.where(elastic, values, 1.0)), 0.0) / (2 * jnp.pi)

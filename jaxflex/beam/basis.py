@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from ..scalars import Scalar, scalar
 from .boundary import Ends
+from .eigen import whiten
 from .mode_shapes import ModeShapes, solve_mode_shapes
 
 QUADRATURE_POINTS = 48  # Gauss-Legendre: exact to rounding for the first ten modes
@@ -82,10 +83,8 @@ def orthogonalise(
     mass: Float[Array, "raw raw"], stiffness: Float[Array, "raw raw"], modal_mass: Scalar
 ) -> Float[Array, "raw raw"]:
     """Mixing V with `V^T mass V = modal_mass I` and `V^T stiffness V` diagonal, ascending."""
-    factor = jnp.linalg.cholesky(mass)
-    half = jax.scipy.linalg.solve_triangular(factor, stiffness, lower=True)
-    whitened = jax.scipy.linalg.solve_triangular(factor, half.T, lower=True)
-    _, vectors = jnp.linalg.eigh((whitened + whitened.T) / 2)
+    factor, whitened = whiten(mass, stiffness)
+    _, vectors = jnp.linalg.eigh(whitened)
     return jnp.sqrt(modal_mass) * jax.scipy.linalg.solve_triangular(factor.T, vectors, lower=False)
 
 

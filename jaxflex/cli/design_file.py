@@ -5,13 +5,11 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from controllers import PD, Design, Move, Shaper
+from controllers import GAINS, PD, Design, Move, Shaper
 
 from ..arm.arm import Arm
 from ..files.arm_file import ArmFile, save_arm
 from ..files.fields import Fields
-
-GAINS = ("stiffness", "damping", "rate_feedforward", "acceleration_feedforward")
 
 
 def save_design(path: Path, arm: Arm, uncertainty: dict[str, float], design: Design) -> None:

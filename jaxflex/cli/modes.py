@@ -14,7 +14,7 @@ from ..arm.arm import Arm
 from ..arm.library import ahmad_arm
 from ..files.arm_file import load_arm
 from ..plotting import plot_modes
-from .runtime import console, parse_numbers, parse_payloads
+from .runtime import console, make_folder, parse_numbers, parse_payloads
 from .tables import Table, number, write_json
 
 
@@ -63,7 +63,7 @@ def modes(
             },
         )
     if output:
-        output.mkdir(parents=True, exist_ok=True)
+        make_folder(output)
         shown = {title: values for title, values in families.items() if values.shape[1]}
         plot_modes(np.asarray(masses), shown).savefig(output / "modes.png", dpi=130)
         console.print(f"wrote {output / 'modes.png'}")
@@ -71,8 +71,7 @@ def modes(
 
 def _controlled(arm: Arm, pose: jnp.ndarray) -> Table:
     """Frequency and damping of the arm as a textbook PD controls it."""
-    bandwidth = None if arm.links and any(link.modes for link in arm.links) else 2 * np.pi
-    linear = linearise(arm, pose, textbook_pd(arm, pose, bandwidth), ())
+    linear = linearise(arm, pose, textbook_pd(arm, pose), ())
     found = closed_loop_modes(linear)
     table = Table(
         "as driven by the textbook PD, nominal payload", ["mode", "frequency [Hz]", "damping ratio"]

@@ -86,8 +86,7 @@ def choose(
         words = f"bang-bang {arm.drive}, open loop"
         return OpenLoop(), BangBang((size,) * joints), rest, words
     move = design.move if design else default_move(arm)
-    bandwidth = None if any(link.modes for link in arm.links) else 2 * np.pi
-    controller = design.controller if design else textbook_pd(arm, jnp.stack(move.stop), bandwidth)
+    controller = design.controller if design else textbook_pd(arm, jnp.stack(move.stop))
     if signal == "step":
         step = Step(move.start, move.stop)
         return controller, step, jnp.stack(move.start), "step of the reference"
