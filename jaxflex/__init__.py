@@ -45,6 +45,11 @@ from .dynamics.lagrange import lagrangian as lagrangian
 from .dynamics.lagrange import mass_matrix as mass_matrix
 from .dynamics.one_way import OneWayLink as OneWayLink
 from .effects import EFFECTS as EFFECTS
+from .effects import AbstractBodyEffect as AbstractBodyEffect
+from .effects import AbstractDriveEffect as AbstractDriveEffect
+from .effects import AbstractEffect as AbstractEffect
+from .effects import AbstractJointEffect as AbstractJointEffect
+from .effects import AbstractSensorEffect as AbstractSensorEffect
 
 # Files
 from .files.arm_file import ArmFile as ArmFile
