@@ -57,9 +57,11 @@ from .files.arm_file import load_arm as load_arm
 from .files.arm_file import read_arm_file as read_arm_file
 from .files.arm_file import save_arm as save_arm
 from .files.fields import ArmFileError as ArmFileError
+from .files.prepare import prepare as prepare
+from .files.prepare import require_channels as require_channels
+from .files.read_recording import read_recording as read_recording
 from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
-from .files.recording import read_recording as read_recording
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 from .scalars import Scalar as Scalar
