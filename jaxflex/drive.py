@@ -94,7 +94,9 @@ def drive_memory_rates(
     if memory is None:
         return None
     return tuple(
-        effect.rate(command[effect.index], drives.current[effect.index], model.joints[effect.index].motor, kept)
+        effect.rate(
+            command[effect.index], drives.current[effect.index], model.joints[effect.index].motor, kept
+        )
         for effect, kept in zip(drive_effects(model), memory, strict=True)
     )
 

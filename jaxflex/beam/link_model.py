@@ -134,7 +134,9 @@ def assumed_modes_link(
     gauge = basis.curvature(gauge_position)
     # the twist of the joint is the joint's share of what the root gives
     some = basis.give > 0
-    share = jnp.where(some, scalar(joint_compliance) * flexural_rigidity / jnp.where(some, basis.give, 1.0), 0.0)
+    share = jnp.where(
+        some, scalar(joint_compliance) * flexural_rigidity / jnp.where(some, basis.give, 1.0), 0.0
+    )
     twist = share * root
     if loose:
         psi = jnp.column_stack([psi, points])

@@ -18,7 +18,7 @@ from ..effects import EFFECTS, AbstractEffect, AbstractJointEffect
 from ..files.arm_file import places
 from .parameters import Parameters
 
-ORDERS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 24)  # of cogging, periods a turn
+ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
 SATURATION = (0.4, 0.55, 0.7, 0.85)  # of the largest command
 COOLING = (0.0, 10.0)  # s
@@ -28,8 +28,8 @@ COOLING = (0.0, 10.0)  # s
 class Candidate:
     """An effect that may be missing, in one of the shapes that are tried.
 
-    `amplitudes`: its parameters that enter linearly; `shape`: values of the others;
-    `free`: shape parameters that a full fit may move.
+    `amplitudes`: its parameters that enter linearly, none where a size in `shape` is tried
+    as it is; `shape`: values of the others; `free`: those that a full fit may move.
     """
 
     effect: str
@@ -42,6 +42,24 @@ class Candidate:
     def key(self) -> tuple[str, str]:
         """Effect and location: what a report names."""
         return self.effect, self.location
+
+
+# amplitudes that may have either sign; all others would be unphysical below zero
+EITHER_SIGN = {
+    "asymmetric_friction", "cogging_torque", "load_torque_bias", "periodic_disturbance", "torque_constant",
+    "payload_mass", "hub_inertia", "gravity", "structural_damping", "viscous_friction",
+    "sensor_bias", "sensor_gain", "sensor_drift",
+}  # fmt: skip
+# and where they make sense only within bounds
+BOUNDS = {"centrifugal_stiffening": (0.3, 3.0)}
+
+
+def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
+    """False for a friction that pushes, a spring that drives away, a lag into the future."""
+    if not candidate.amplitudes:
+        return 0.3 < step[0] < 3.0
+    low, high = BOUNDS.get(candidate.effect, (0.0, np.inf))
+    return candidate.effect in EITHER_SIGN or all(low <= value <= high for value in step)
 
 
 def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float]) -> list[AbstractEffect]:
@@ -84,16 +102,21 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
         if name == "stribeck_friction":
             for share in STRIBECK:
                 rate = share * motion.rms_rate(effect.index)
-                yield Candidate(name, location, ("torque", "level"), (("stribeck_rate", rate),), ("stribeck_rate",))
+                shape = (("stribeck_rate", rate), ("transition_rate", float(effect.transition_rate)))
+                yield Candidate(
+                    name, location, ("torque", "level"), shape, ("stribeck_rate", "transition_rate")
+                )
         elif name == "cogging_torque":
             for order in ORDERS:
-                yield Candidate(name, location, ("sine", "cosine"), (("order", float(order)),), ("order",))
+                yield Candidate(name, location, ("sine", "cosine"), (("order", float(order)),))
         elif name == "periodic_disturbance":
             for f in frequencies:
                 yield Candidate(name, location, ("sine", "cosine"), (("frequency", f),), ("frequency",))
         elif name == "voltage_saturation":
             for share in SATURATION:
-                yield Candidate(name, location, (), (("limit", share * motion.largest_command(effect.index)),), ("limit",))
+                yield Candidate(
+                    name, location, (), (("limit", share * motion.largest_command(effect.index)),), ("limit",)
+                )
         elif name == "torque_constant":
             for share in (0.0, 1.0):
                 yield Candidate(name, location, ("change",), (("back_emf_share", share),))
@@ -104,6 +127,9 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
             yield Candidate(name, location, ("along_y", "along_x"))
         elif name == "cable_stiffness":
             yield Candidate(name, location, ("stiffness",))
+        elif name in ("coulomb_friction", "asymmetric_friction"):
+            shape = (("transition_rate", float(effect.transition_rate)),)
+            yield Candidate(name, location, ("torque",), shape, ("transition_rate",))
         else:
             yield Candidate(name, location, (next(iter(effect.units)),))
 
@@ -111,10 +137,13 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
 class Motion:
     """The motion that a model predicts for a run, sample by sample and in between."""
 
-    def __init__(self, parameters: Parameters, states: np.ndarray, ends: np.ndarray, command: np.ndarray, dt: float):
+    def __init__(
+        self, parameters: Parameters, vector: np.ndarray, states: np.ndarray, ends: np.ndarray,
+        command: np.ndarray, dt: float,
+    ):  # fmt: skip
         self.parameters = parameters
-        arm = parameters.arm
-        self.model = arm.assemble()
+        self.arm = parameters.build(jnp.asarray(vector))
+        self.model = self.arm.assemble()
         self.command = command
         self.dt = dt
         following = np.concatenate([states[:, 1:], ends[:, None]], 1)
@@ -132,7 +161,7 @@ class Motion:
 
     def current(self, joint: int) -> np.ndarray:
         """Current [A] within each interval."""
-        arm, n = self.parameters.arm, self.model.size
+        arm, n = self.arm, self.model.size
         before = sum(has_current_state(self.model, i) for i in range(joint))
         if has_current_state(self.model, joint):
             return self.between[..., 2 * n + before]
@@ -152,7 +181,7 @@ class Motion:
 
     def heat(self, joint: int, cooling: float) -> np.ndarray:
         """Heat [J] in the winding since the start of the run."""
-        motor = self.parameters.arm.joints[joint].motor
+        motor = self.arm.joints[joint].motor
         power = float(motor.resistance) * (self.current(joint) ** 2).mean(0).ravel()
         keep = np.exp(-self.dt / cooling) if cooling > 0 else 1.0
         found = np.zeros_like(power)
@@ -191,11 +220,11 @@ class Motion:
         elif candidate.effect == "voltage_saturation":
             column[..., joint] = np.clip(command, -shape["limit"], shape["limit"]) - command
         elif candidate.effect == "winding_heating":
-            motor = self.parameters.arm.joints[joint].motor
+            motor = self.arm.joints[joint].motor
             drop = float(motor.resistance) * self.current(joint).mean(0)
             column[..., joint] = -drop * self.heat(joint, shape["cooling_time"])
         elif candidate.effect == "torque_constant":
-            motor = self.parameters.arm.joints[joint].motor
+            motor = self.arm.joints[joint].motor
             per = float(motor.gear_ratio)
             column[..., joints + joint] = float(motor.efficiency) * per * self.current(joint).mean(0)
             column[..., joint] = -shape["back_emf_share"] * per * self.rate(joint).mean(0)

@@ -149,9 +149,7 @@ def _nominal(file: ArmFile) -> list[Nominal]:
             add(f"flexural_rigidity{tail}", ["flexural_rigidity"], link.flexural_rigidity, [(bend, 1)])
         ratios = link.damping_ratio
         if not isinstance(ratios, str):
-            leaves = [
-                (lambda a, i=i, k=k: a.links[i].damping_ratio[k], 1) for k in range(len(ratios))
-            ]
+            leaves = [(lambda a, i=i, k=k: a.links[i].damping_ratio[k], 1) for k in range(len(ratios))]
             add(f"damping_ratio{tail}", ["damping_ratio"], ratios[0], leaves)
     for i, joint in enumerate(arm.joints):
         tail = f"_{i + 1}" if len(arm.joints) > 1 else ""

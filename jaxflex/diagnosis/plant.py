@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 from ..arm.arm import AssembledArm
 from ..drive import drive, drive_effects, effect_torques, has_current_state
 from ..dynamics.lagrange import accelerations
+from ..dynamics.simplify import simplified
 from ..effects import WindingHeating
 from ..scalars import Scalar
 from ..sensors import read_channels
@@ -58,23 +59,22 @@ def state_size(model: AssembledArm, channels: tuple[str, ...]) -> int:
     return 2 * model.size + currents + len(model.joints) + len(channels)
 
 
-def _split(model: AssembledArm, x: Array):
+def _split(model: AssembledArm, x: tuple):
     n, joints = model.size, len(model.joints)
     currents = sum(has_current_state(model, i) for i in range(joints))
-    q, qd = tuple(x[:n]), tuple(x[n : 2 * n])
     rest = 2 * n + currents
-    return q, qd, tuple(x[2 * n : rest]), tuple(x[rest : rest + joints]), x[rest + joints :]
+    return x[:n], x[n : 2 * n], x[2 * n : rest], x[rest : rest + joints], x[rest + joints :]
 
 
-def _drives(model: AssembledArm, command: Array, qd: tuple, currents: tuple, heat: tuple):
+def _drives(model: AssembledArm, command: tuple, qd: tuple, currents: tuple, heat: tuple):
     memory = tuple(
         heat[effect.index] if isinstance(effect, WindingHeating) else None for effect in drive_effects(model)
     )
     rates, _ = model.split(qd)
-    return drive(model, tuple(command), currents, rates, memory)
+    return drive(model, command, currents, rates, memory)
 
 
-def _motion(model: AssembledArm, t: Scalar, x: Array, command: Array, force: Array):
+def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
     """Drives and accelerations at an instant."""
     q, qd, currents, heat, _ = _split(model, x)
     drives = _drives(model, command, qd, currents, heat)
@@ -85,14 +85,13 @@ def _motion(model: AssembledArm, t: Scalar, x: Array, command: Array, force: Arr
     )
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
-    total = tuple(
-        tau + f - d * v for tau, f, d, v in zip(torques, tuple(force), model.damping(), qd, strict=True)
-    )
+    total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(), qd, strict=True))
     return drives, accelerations(model, q, qd, total)
 
 
-def derivative(model: AssembledArm, t: Scalar, x: Array, command: Array, force: Array) -> Array:
-    """`x'`, instruments left where they are."""
+@simplified
+def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple) -> tuple:
+    """`x'`, instruments left where they are; tuples of scalars, which a batch turns into vectors."""
     _, qd, _, heat, shown = _split(model, x)
     drives, qdd = _motion(model, t, x, command, force)
     warming = [jnp.zeros_like(t)] * len(model.joints)
@@ -100,21 +99,18 @@ def derivative(model: AssembledArm, t: Scalar, x: Array, command: Array, force: 
         if isinstance(effect, WindingHeating):
             i = effect.index
             warming[i] = effect.rate(command[i], drives.current[i], model.joints[i].motor, heat[i])
-    return jnp.concatenate(
-        [jnp.stack(qd), jnp.stack(qdd), *[jnp.stack([v]) for v in drives.current_rate],
-         jnp.stack(warming), jnp.zeros_like(shown)]
-    )  # fmt: skip
+    return (*qd, *qdd, *drives.current_rate, *warming, *(jnp.zeros_like(y) for y in shown))
 
 
-def truth(model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: Array, command: Array) -> Array:
+def truth(model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple) -> tuple:
     """What perfect instruments would show."""
     q, qd, currents, heat, _ = _split(model, x)
     if any(name.startswith("tip_acceleration") for name in channels):
-        drives, qdd = _motion(model, t, x, command, jnp.zeros(model.size))
+        drives, qdd = _motion(model, t, x, command, (jnp.zeros_like(t),) * model.size)
     else:
         drives, qdd = _drives(model, command, qd, currents, heat), None
     found = read_channels(model, q, qd, drives, qdd)
-    return jnp.stack([found[name] for name in channels])
+    return tuple(found[name] for name in channels)
 
 
 def run_piece(
@@ -135,30 +131,44 @@ def run_piece(
     h = sample_time / substeps
     some = instruments.lag > 0
     safe = jnp.where(some, instruments.lag, 1.0)
-    decay = jnp.where(some, jnp.exp(-sample_time / safe), 0.0)
-    mean = jnp.where(some, 1 - decay, 1.0) * instruments.lag / sample_time
+    decay = tuple(jnp.where(some, jnp.exp(-sample_time / safe), 0.0))
+    mean = tuple(jnp.where(some, 1 - jnp.exp(-sample_time / safe), 1.0) * instruments.lag / sample_time)
+    gain, bias, drift = (tuple(part) for part in instruments[:3])
     count = len(channels)
+
+    def moved(x, slope, by):
+        return tuple(a + by * b for a, b in zip(x, slope, strict=True))
 
     def step(x, inputs):
         u, f, t = inputs
         before = truth(model, channels, t, x, u)
-        reading = instruments.gain * x[-count:] + instruments.bias + instruments.drift * t
+        shown = x[-count:]
+        reading = tuple(g * y + b + d * t for g, y, b, d in zip(gain, shown, bias, drift, strict=True))
 
-        def substep(carry, _):
-            t, y = carry
-            k1 = derivative(model, t, y, u, f)
-            k2 = derivative(model, t + h / 2, y + h / 2 * k1, u, f)
-            k3 = derivative(model, t + h / 2, y + h / 2 * k2, u, f)
-            k4 = derivative(model, t + h, y + h * k3, u, f)
-            return (t + h, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)), None
+        def stage(carry, weights):
+            # classical Runge-Kutta as a scan over its stages, which compiles once for all four
+            y, slope, total = carry
+            ahead, share = weights
+            slope = derivative(model, t + ahead * h, moved(y, slope, ahead * h), u, f)
+            return (y, slope, moved(total, slope, share)), None
 
-        (after_t, y), _ = jax.lax.scan(substep, (t, x), None, length=substeps)
-        after = truth(model, channels, after_t, y, u)
-        shown = decay * x[-count:] + (mean - decay) * before + (1 - mean) * after
-        return y.at[-count:].set(shown), (reading, x)
+        def substep(y, _):
+            zero = tuple(jnp.zeros_like(v) for v in y)
+            weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
+            (_, _, total), _ = jax.lax.scan(stage, (y, zero, zero), weights)
+            return moved(y, total, h), None
 
-    end, (reading, states) = jax.lax.scan(step, start, (command, force, time))
-    return Response(reading, end, states)
+        y, _ = jax.lax.scan(substep, x, None, length=substeps)
+        after = truth(model, channels, t + sample_time, y, u)
+        lagged = tuple(
+            a * s + (m - a) * b + (1 - m) * c
+            for a, s, m, b, c in zip(decay, shown, mean, before, after, strict=True)
+        )
+        return (*y[:-count], *lagged), (reading, x)
+
+    inputs = (tuple(command.T), tuple(force.T), time)
+    end, (reading, states) = jax.lax.scan(step, tuple(start), inputs)
+    return Response(jnp.stack(reading, -1), jnp.stack(end), jnp.stack(states, -1))
 
 
 def _lanes(model, instruments, channels, starts, force, pieces: Pieces) -> Response:

@@ -1,6 +1,8 @@
 """From an arm file and recordings to a problem: channels, noise, pieces, and where each starts."""
 
+import dataclasses
 import math
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -10,58 +12,155 @@ from scipy.signal import savgol_filter
 from ..arm.arm import Arm
 from ..drive import has_current_state
 from ..files.arm_file import ArmFile
+from ..files.prepare import prepare
 from ..files.recording import Recording, RecordingError
-from ..simulation.trajectory import Trajectory
+from .catalogue import template
+from .noise import noise_floors
 from .parameters import Parameters
 from .plant import derivative, state_size
-from .shooting import Run, Setting
+from .shooting import Problem, Run, Setting
 
 OUTPUTS = ("angle", "rate", "current", "tip_deflection", "strain", "tip_acceleration")
 PIECE = 0.1  # s: the shortest horizon
+SHORTEST_PIECE = 10  # samples
 LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
+FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
+SMALLEST_NOISE = 1e-4  # of a channel's spread: no model is better than that
+SAMPLES = 12_000  # of one recording that are used
+CALIBRATION = 0.6  # of a single recording; the rest is held out
 
 
-def channels_of(file: ArmFile, recording: Recording) -> tuple[list[str], list[str]]:
-    """Inputs, one a joint, and outputs that a recording holds for this arm.
+@dataclasses.dataclass(frozen=True)
+class Prepared:
+    """A problem with its runs for calibration and those held out, and what was done to get there."""
 
-    **Raises** `RecordingError` if an input or every output is missing.
-    """
-    arm = file.arm
+    problem: Problem
+    calibration: list[Run]
+    held_out: list[Run]
+    floor: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def wanted_channels(arm: Arm) -> tuple[list[str], list[str]]:
+    """Names of the inputs, one a joint, and of all outputs that a recording of this arm may hold."""
     inputs = [f"{arm.drive}_{i + 1}" for i in range(len(arm.joints))]
-    for name in inputs:
-        if name not in recording.channels:
-            raise RecordingError(
-                f"column {name!r} is missing: the arm is driven by {arm.drive}, so each joint's "
-                f"{arm.drive} is needed; found {', '.join(recording.channels)}."
-            )
     outputs = []
-    for name in recording.channels:
-        kind, _, number = name.rpartition("_")
-        if kind not in OUTPUTS or name in inputs or not number.isdigit():
-            continue
-        parts = arm.links if kind in ("tip_deflection", "strain", "tip_acceleration") else arm.joints
-        there = int(number) <= len(parts)
-        if kind == "current" and there:
-            there = arm.joints[int(number) - 1].motor is not None
-        if kind == "strain" and there:
-            there = arm.links[int(number) - 1].thickness is not None
-        if there:
-            outputs.append(name)
-    if not outputs:
-        raise RecordingError(
-            f"no output of this arm was recorded; at least one of {', '.join(OUTPUTS)} (with the number "
-            f"of the joint or link) is needed; found {', '.join(recording.channels)}."
-        )
+    for i, joint in enumerate(arm.joints, 1):
+        outputs += [f"angle_{i}", f"rate_{i}"]
+        if joint.motor is not None and arm.drive == "voltage":
+            outputs.append(f"current_{i}")
+    for i, link in enumerate(arm.links, 1):
+        if link.modes > 0:
+            outputs.append(f"tip_deflection_{i}")
+            if link.thickness is not None:
+                outputs.append(f"strain_{i}")
+        outputs.append(f"tip_acceleration_{i}")
     return inputs, outputs
+
+
+def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]:
+    """The arm with the current of windings much faster than a sample following at once."""
+    joints, notes = [], []
+    for i, joint in enumerate(arm.joints, 1):
+        motor = joint.motor
+        if motor is not None and motor.inductance is not None:
+            constant = float(motor.inductance / motor.resistance)
+            if constant < FAST_WINDING * sample_time:
+                joint = dataclasses.replace(joint, motor=dataclasses.replace(motor, inductance=None))
+                notes.append(
+                    f"joint {i}: the winding (L/R = {1e3 * constant:.2g} ms) is taken to follow at once"
+                )
+        joints.append(joint)
+    return dataclasses.replace(arm, joints=tuple(joints)), notes
+
+
+def make_problem(file: ArmFile, recordings: Sequence[Recording]) -> Prepared:
+    """Check the recordings, find their noise, cut them into pieces.
+
+    **Raises** `RecordingError` if an input or every output is missing, or too little is left.
+    """
+    inputs, known = wanted_channels(file.arm)
+    # all recordings are brought to the slowest of their rates
+    step = max(recording.sample_time for recording in recordings)
+    even = [prepare(r, inputs, known, sample_time=step, samples=SAMPLES) for r in recordings]
+    pieces = [piece for group in even for piece in group]
+    outputs = tuple(name for name in known if all(name in piece.channels for piece in pieces))
+    if not outputs:
+        found = "; ".join(", ".join(piece.channels) for piece in pieces)
+        raise RecordingError(f"the recordings share no output; they hold {found}.")
+    notes = [note for piece in pieces for note in piece.repairs]
+    arm, more = without_fast_windings(file.arm, step)
+    notes += more
+    file = dataclasses.replace(file, arm=arm)
+    floors = noise_floors(pieces, inputs, outputs)
+    noise = []
+    for name in outputs:
+        spread = float(np.mean([np.std(piece[name]) for piece in pieces]))
+        noise.append(max(floors[name].innovation, SMALLEST_NOISE * spread))
+    colour = [np.array([1.0, *(-a for a in floors[name].ar)]) for name in outputs]
+    length = max(round(PIECE / step), SHORTEST_PIECE)
+    parameters = Parameters(file, template(arm, outputs, _transition_rates(arm, pieces, step)))
+    model = parameters.arm.assemble()
+    setting = Setting(
+        parameters, outputs, np.array(noise), colour, step, length,
+        substeps_for(parameters.arm, step), np.full(state_size(model, outputs), 1e3),
+    )  # fmt: skip
+    runs = [make_run(f"run {i}", piece, inputs, setting) for i, piece in enumerate(pieces, 1)]
+    if len(runs) > 1:
+        count = (len(runs) + 1) // 2
+        calibration, held_out = runs[:count], runs[count:]
+    else:
+        cut = int(CALIBRATION * len(pieces[0]) / length) * length
+        calibration = [make_run("first part", pieces[0].window(0, cut), inputs, setting)]
+        held_out = [make_run("last part", pieces[0].window(cut, len(pieces[0])), inputs, setting, cut * step)]
+    return Prepared(
+        Problem(setting, runs), calibration, held_out,
+        {name: floors[name].std for name in outputs}, tuple(dict.fromkeys(notes)),
+    )  # fmt: skip
+
+
+def make_run(
+    name: str, recording: Recording, inputs: Sequence[str], setting: Setting, begin: float = 0.0
+) -> Run:
+    """A recording cut into pieces, its starts guessed; `begin` [s] since the start of the run."""
+    dt, length = setting.sample_time, setting.length
+    times = begin + np.arange(len(recording)) * dt
+    command = np.stack([recording[channel] for channel in inputs], -1)
+    reading = np.stack([recording[channel] for channel in setting.channels], -1)
+    pieces = -(-len(times) // length)
+    total = pieces * length
+    padded = np.pad(reading, ((0, total - len(times)), (0, 0)), mode="edge").reshape(pieces, length, -1)
+    valid = (np.arange(total) < len(times)).reshape(pieces, length)
+    starts = first_starts(setting.parameters, setting.channels, times, reading, command, length, dt)
+    return Run(name, times, command, padded, valid, starts)
+
+
+def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:
+    """Rate [rad/s] over which friction changes sign: 1 % of what each joint typically turns at."""
+    found = []
+    for i in range(1, len(arm.joints) + 1):
+        rates = [1.0]
+        for piece in pieces:
+            if f"rate_{i}" in piece.channels:
+                rates.append(float(np.std(piece[f"rate_{i}"])))
+            elif f"angle_{i}" in piece.channels:
+                window = max(1, round(0.02 / dt))
+                angle = piece[f"angle_{i}"]
+                rates.append(float(np.std((angle[window:] - angle[:-window]) / (window * dt))))
+        found.append(0.01 * float(np.mean(rates[1:] or rates)))
+    return found
 
 
 def substeps_for(arm: Arm, sample_time: float) -> int:
     """Runge-Kutta steps in a sample interval that resolve the fastest motion of the arm at rest."""
     model = arm.assemble()
-    x = jnp.zeros(state_size(model, ()))
-    command, force = jnp.zeros(len(arm.joints)), jnp.zeros(model.size)
     zero = jnp.zeros(())
-    jacobian = jax.jacfwd(lambda x: derivative(model, zero, x, command, force))(x)
+    command, force = (zero,) * len(arm.joints), (zero,) * model.size
+
+    def slope(x):
+        return jnp.stack(derivative(model, zero, tuple(x), command, force))
+
+    jacobian = jax.jit(jax.jacfwd(slope))(jnp.zeros(state_size(model, ())))
     fastest = float(np.abs(np.linalg.eigvals(np.asarray(jacobian))).max())
     return max(1, math.ceil(fastest * sample_time / LIMIT))
 

@@ -6,7 +6,12 @@ squares problem in the parameters, the same for a horizon of a tenth of a second
 a whole run (Bock's direct multiple shooting).
 """
 
+import dataclasses
 from dataclasses import dataclass, field
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -14,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
+from ..arm.arm import Arm, AssembledArm
 from .parameters import Parameters
 from .plant import Direction, Instruments, Pieces, Response, respond, slopes, state_size
 
@@ -98,6 +104,16 @@ def delayed(times: np.ndarray, command: np.ndarray, delay: float, dt: float) -> 
     return mean, slope
 
 
+@eqx.filter_jit
+def _assembled_along(arm: Arm, directions: Any) -> Any:
+    arrays, static = eqx.partition(arm, eqx.is_inexact_array)
+
+    def assembled(arrays):
+        return eqx.filter(eqx.combine(arrays, static).assemble(), eqx.is_inexact_array)
+
+    return jax.vmap(lambda d: jax.jvp(assembled, (arrays,), (d,))[1])(directions)
+
+
 class Problem:
     """Runs and parameters, linearised and solved."""
 
@@ -115,14 +131,18 @@ class Problem:
             )
             for joint in range(len(setting.parameters.arm.joints))
         ]
-        self._constants = eqx.filter_jit(lambda v: setting.parameters.build(v).assemble())
-        self._tangents = eqx.filter_jit(self._constants_along)
 
-    def _constants_along(self, vector, directions):
-        def arrays(v):
-            return eqx.filter(self.setting.parameters.build(v).assemble(), eqx.is_inexact_array)
+    def _constants(self, vector: np.ndarray) -> AssembledArm:
+        return self.setting.parameters.build(jnp.asarray(vector)).assemble()
 
-        return jax.vmap(lambda d: jax.jvp(arrays, (vector,), (d,))[1])(directions)
+    def _tangents(self, vector: np.ndarray, directions: np.ndarray) -> Any:
+        build, at = self.setting.parameters.build, jnp.asarray(vector)
+        arm = build(at)
+
+        def along(direction):
+            return eqx.filter(jax.jvp(build, (at,), (direction,))[1], eqx.is_inexact_array)
+
+        return _assembled_along(arm, jax.vmap(along)(jnp.asarray(directions)))
 
     def instruments(self, vector: np.ndarray) -> Instruments:
         """The instruments that a parameter vector stands for."""
@@ -160,9 +180,11 @@ class Problem:
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
-        model = self._constants(jnp.asarray(vector))
+        model = self._constants(vector)
         pieces, _ = self.pieces(run, vector)
-        found = respond(model, self.instruments(vector), self.setting.channels, jnp.asarray(run.starts), pieces)
+        found = respond(
+            model, self.instruments(vector), self.setting.channels, jnp.asarray(run.starts), pieces
+        )
         return Response(*(np.asarray(part) for part in found))
 
     def linearise(
@@ -174,7 +196,7 @@ class Problem:
         sequence of changes of the commands and of forces on the coordinates.
         """
         s = self.setting
-        model = self._constants(jnp.asarray(vector))
+        model = self._constants(vector)
         instruments = self.instruments(vector)
         pieces, delay_slope = self.pieces(run, vector)
         response = self.predict(run, vector)
@@ -195,18 +217,20 @@ class Problem:
         if forcing is not None:
             command[states + len(columns) : total] = forcing[..., :joints]
             force[states + len(columns) : total] = forcing[..., joints:]
-        readings, ends = [], []
-        for first in range(0, lanes, LANES):
+
+        def some(first):
             part = slice(first, first + LANES)
-            arrays = self._tangents(jnp.asarray(vector), jnp.asarray(unit[part]))
+            arrays = self._tangents(vector, unit[part])
             moved = self._instruments_along(unit[part])
             direction = Direction(
                 arrays, moved, jnp.asarray(start[part, None, :]), jnp.asarray(command[part]),
                 jnp.asarray(force[part]),
             )  # fmt: skip
             found = slopes(model, instruments, s.channels, jnp.asarray(run.starts), pieces, direction)
-            readings.append(np.asarray(found.reading))
-            ends.append(np.asarray(found.end))
+            return np.asarray(found.reading), np.asarray(found.end)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            readings, ends = zip(*pool.map(some, range(0, lanes, LANES)), strict=True)
         reading = np.moveaxis(np.concatenate(readings)[:total], 0, -1) / s.noise[:, None]
         end = np.moveaxis(np.concatenate(ends)[:total], 0, -1)
         gap = np.zeros_like(run.starts)
@@ -228,7 +252,9 @@ class Problem:
         columns = linear.by_column.shape[-1]
         states = run.starts.shape[1]
         total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0)
-        cuts = np.unique(np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int))
+        cuts = np.unique(
+            np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
+        )
         for first, last in zip(cuts[:-1], cuts[1:], strict=True):
             by_start, by_column, offset = np.eye(states), np.zeros((states, columns)), np.zeros(states)
             rows, kept = [], []
@@ -269,3 +295,12 @@ class Problem:
             first = solved[:, -1] - solved[:, :-1] @ step
             for j, by_start, by_column, offset in kept:
                 run.starts[j] = run.starts[j] + by_start @ first + by_column @ step + offset
+
+    def refresh(self, run: Run, vector: np.ndarray, linear: Linearised) -> Linearised:
+        """The same slopes about where the run is now."""
+        response = self.predict(run, vector)
+        gap = np.zeros_like(run.starts)
+        gap[:-1] = response.end[:-1] - run.starts[1:]
+        residual = (run.reading - response.reading) / self.setting.noise
+        residual = np.where(run.valid[..., None], residual, 0.0)
+        return dataclasses.replace(linear, residual=residual, gap=gap)

@@ -1,0 +1,222 @@
+"""Turn what a search came to into an answer: verdict, figures on held-out data, and words."""
+
+import time
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..effects import EFFECTS
+from ..effects.base import AbstractSensorEffect
+from ..files.arm_file import ArmFile
+from ..sensors import unit
+from .calibrate import Freedom, fit
+from .catalogue import Candidate
+from .hypothesis import HORIZONS, Hypothesis, Outcome, Search, freedom
+from .locate import LatentForce, regimes
+from .prepare import Prepared
+from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
+from .shooting import Problem, Run
+
+AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
+MOSTLY = 0.8  # share of the gap that named effects must explain where the floor is not reached
+HORIZON = HORIZONS[-1]
+
+
+def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome, began: float) -> Diagnosis:
+    """The diagnosis that an outcome amounts to."""
+    problem, parameters = prepared.problem, search.parameters
+    search.restart(outcome.nominal_starts)
+    forces_before = search.latent(outcome.nominal.fit.vector)
+    search.restart(outcome.final_starts)
+    forces_after = search.latent(outcome.final.fit.vector)
+    before = judge(problem, prepared.held_out, outcome.nominal)
+    after = judge(problem, prepared.held_out, outcome.final)
+    levels = [
+        float(np.mean([(found[c] / s) ** 2 for c, s in _noise(problem).items()]))
+        for found, _ in (before, after)
+    ]
+    gone = (levels[0] - levels[1]) / max(levels[0] - 1, 1e-9) if levels[0] > AT_FLOOR else 0.0
+    final = everything(prepared, search, outcome)
+    estimates = _estimates(search, final)
+    effects = tuple(
+        _named(search, final, effect, gain, estimates)
+        for effect, gain in zip(outcome.final.effects, outcome.gains, strict=True)
+    )
+    alternatives = []
+    for place, rival in outcome.rivals:
+        candidate = rival.effects[-1]
+        alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
+    verdict = _verdict(outcome, levels, gone)
+    vector = final.fit.vector
+    arm = parameters.build(jnp.asarray(vector))
+    improved = _with_outside(file, search, arm, outcome.final.effects, vector)
+    comparison = _comparison(prepared, before[1], after[1])
+    return Diagnosis(
+        verdict=verdict,
+        effects=effects,
+        alternatives=tuple(alternatives),
+        where=_where(problem, before[0], forces_before, outcome),
+        gap=Gap(
+            "root mean square error of predictions over 1 s from estimated starts",
+            True, before[0], after[0], prepared.floor,
+        ),
+        next_experiment=_next(verdict, effects, alternatives, forces_after),
+        calibrated={part.name: estimates[i] for i, part in enumerate(parameters.nominal)},
+        improved=improved,
+        explained=float(np.clip(gone, 0.0, 1.0)),
+        notes=prepared.notes,
+        seconds=time.perf_counter() - began,
+        forces_before=tuple(forces_before),
+        forces_after=tuple(forces_after),
+        comparison=comparison,
+    )  # fmt: skip
+
+
+def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[dict[str, float], list]:
+    """Error of each channel over held-out runs, starts alone fitted; and the predictions."""
+    vector = hypothesis.fit.vector
+    # the phase of a disturbance is its own in every run
+    free = [
+        problem.setting.parameters.position(*effect.key, name)
+        for effect in hypothesis.effects
+        if effect.effect == "periodic_disturbance"
+        for name in effect.amplitudes
+    ]
+    count = len(free)
+    held = Freedom(tuple(free), np.zeros(count), np.zeros(count), np.full(count, -np.inf))
+    squares, predictions = [], []
+    for run in runs:
+        found = fit(problem, [run], vector, held, 1, 1)
+        found = fit(problem, [run], found.vector, held, HORIZON, 2)
+        reading = problem.predict(run, found.vector).reading
+        error = np.where(run.valid[..., None], run.reading - reading, 0.0)
+        squares.append((error**2).sum((0, 1)) / run.valid.sum())
+        predictions.append((run, reading))
+    rms = np.sqrt(np.mean(squares, 0))
+    return dict(zip(problem.setting.channels, map(float, rms), strict=True)), predictions
+
+
+def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothesis:
+    """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
+    final = outcome.final
+    if any(effect.effect == "periodic_disturbance" for effect in final.effects) or final.horizon < HORIZON:
+        return final
+    runs = [*prepared.calibration, *prepared.held_out]
+    search.restart(outcome.final_starts)
+    free = freedom(search.parameters, final.effects)
+    found = fit(prepared.problem, runs, final.fit.vector, free, HORIZON, 3)
+    return Hypothesis(final.effects, found, HORIZON)
+
+
+def _noise(problem: Problem) -> dict[str, float]:
+    s = problem.setting
+    return {c: float(n) for c, n in zip(s.channels, s.noise, strict=True)}
+
+
+def _verdict(outcome: Outcome, levels: list[float], gone: float) -> str:
+    if not outcome.final.effects:
+        return "nothing_missing" if levels[1] < AT_FLOOR else "unexplained"
+    if levels[1] > AT_FLOOR and gone < MOSTLY:
+        return "unexplained"
+    return "ambiguous" if outcome.rivals else "missing_effect"
+
+
+def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
+    """Every parameter that was free, by its place in the vector."""
+    found, parameters = hypothesis.fit, search.parameters
+    matrix = found.normal.matrix + np.diag(found.freedom.precision)
+    scale = np.sqrt(np.clip(np.diag(matrix), 1e-300, None))
+    inverse = np.linalg.pinv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
+    spread = np.sqrt(np.clip(np.diag(inverse), 0, None) * max(found.level, 1.0))
+    estimates = {}
+    for column, std in zip(found.freedom.columns, spread, strict=True):
+        value = found.vector[column]
+        if column < len(parameters.nominal):
+            part = parameters.nominal[column]
+            size = part.value * float(np.exp(part.spread * value))
+            estimates[column] = Estimate(size, size * part.spread * float(std), "SI")
+        else:
+            part = parameters.effect[column - len(parameters.nominal)]
+            estimates[column] = Estimate(float(value), float(std), _unit(part.unit, part.location))
+    return estimates
+
+
+def _unit(text: str, location: str) -> str:
+    if not text.startswith("of the channel"):
+        return text
+    own = unit(location)
+    return own if text == "of the channel" else f"{own}/s"
+
+
+def _named(
+    search: Search, hypothesis: Hypothesis, effect: Candidate, gain: float, estimates: dict[int, Estimate]
+) -> NamedEffect:
+    found = {}
+    for name in (*effect.amplitudes, *effect.free):
+        if name != "transition_rate":
+            found[name] = estimates[search.parameters.position(*effect.key, name)]
+    for name, value in effect.shape:
+        if name not in found and name != "transition_rate":
+            found[name] = Estimate(float(value), 0.0, EFFECTS[effect.effect].units[name])
+    worth = float(gain) if np.isfinite(gain) else float(hypothesis.fit.count)
+    return NamedEffect(effect.effect, effect.location, found, worth, EFFECTS[effect.effect].looks_like)
+
+
+def _where(
+    problem: Problem, before: dict[str, float], forces: list[LatentForce], outcome: Outcome
+) -> tuple[Place, ...]:
+    excess = {c: max((before[c] / s) ** 2 - 1, 0.0) for c, s in _noise(problem).items()}
+    total = sum(excess.values())
+    if total <= 0:
+        return ()
+    equation = forces[0].equation
+    regime, _ = regimes(forces[0])[0]
+    for effect in outcome.final.effects[:1]:
+        if issubclass(EFFECTS[effect.effect], AbstractSensorEffect):
+            equation, regime = f"sensor {effect.location}", EFFECTS[effect.effect].looks_like
+    order = sorted(excess, key=lambda c: -excess[c])
+    return tuple(Place(c, equation, regime, excess[c] / total) for c in order if excess[c] > 0.01 * total)
+
+
+def _next(
+    verdict: str, effects: tuple[NamedEffect, ...], alternatives: list[NamedEffect], forces: list[LatentForce]
+) -> str:
+    if verdict == "nothing_missing":
+        return "None needed: the model predicts what was measured down to its noise."
+    if verdict == "unexplained":
+        picture, share = regimes(forces[0])[0]
+        return (
+            f"What is left acts most like a force at {forces[0].equation} that goes with {picture} "
+            f"({share:.0%} of it). Repeat the run twice as large and at half the speed: what scales with "
+            "the motion is in the arm, what does not is outside of it."
+        )
+    if alternatives:
+        names = " from ".join([effects[0].name, *(a.name for a in alternatives)])
+        return f"An experiment that tells {names}: see the separation of each in the report."
+    return "Repeat the run with another payload: the same effect with the same size confirms it."
+
+
+def _with_outside(file: ArmFile, search: Search, arm, effects: tuple[Candidate, ...], vector: np.ndarray):
+    """The calibrated arm with the effects that were found, and no absent ones."""
+    import dataclasses
+
+    kept = list(file.arm.effects)
+    for effect in effects:
+        kind = EFFECTS[effect.effect]
+        values = {
+            field: float(vector[search.parameters.position(*effect.key, field)]) for field in kind.units
+        }
+        kept.append(kind(location=effect.location, **values))
+    return dataclasses.replace(arm, effects=tuple(kept))
+
+
+def _comparison(prepared: Prepared, before: list, after: list) -> Comparison:
+    run, first = before[0]
+    _, second = after[0]
+    count = len(run.times)
+    channels = prepared.problem.setting.channels
+
+    def flat(values):
+        return {name: values[..., i].ravel()[:count] for i, name in enumerate(channels)}
+
+    return Comparison(run.times, flat(run.reading), flat(first), flat(second))

@@ -1,0 +1,155 @@
+"""Find where simulation and measurement disagree, name what is missing, add it, show the gap shrink."""
+
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..files.arm_file import ArmFile
+from ..files.recording import Recording
+from .describe import describe
+from .hypothesis import HORIZONS, Hypothesis, Outcome, Ranked, Search, allowance, without
+from .prepare import make_problem
+from .result import Diagnosis
+
+MOST_EFFECTS = 5
+STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain worth an effect
+SHORT_LIST = 3
+NEAR = 0.5  # of the strongest: rivals below it are not fitted
+CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
+TIE = 0.05  # of the gain: rivals nearer than this are not told apart
+
+
+def diagnose(
+    file: ArmFile, recordings: Sequence[Recording], say: Callable[[str], None] | None = None
+) -> Diagnosis:
+    """Compare the arm of `file` with `recordings` and name what it lacks.
+
+    Nominal parameters are calibrated within the uncertainty that the file states. Half of
+    the recordings (the last 40 % of a single one) are held out to judge by. `say` is told
+    of the progress, a line at a time.
+
+    **Returns** a `Diagnosis` with one of four verdicts.
+
+    **Raises** `RecordingError` if the recordings do not fit the arm.
+    """
+    began = time.perf_counter()
+    say = say or (lambda line: None)
+    prepared = make_problem(file, recordings)
+    search = Search(prepared.problem, prepared.calibration, say)
+    outcome = find(search)
+    return describe(file, prepared, search, outcome, began)
+
+
+def find(search: Search) -> Outcome:
+    """Add effects one at a time until nothing in the catalogue stands out."""
+    say = search.say
+    settled = search.settle(search.parameters.start)
+    settled_starts = search.starts()
+    base, base_starts = Hypothesis((), settled, 1), settled_starts
+    outcome: Outcome | None = None
+    for _ in range(MOST_EFFECTS + 1):
+        fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
+        starts = search.starts()
+        say(
+            f"calibrated with {len(base.effects)} effect(s): misfit {fitted.fit.level:.3g} of the noise floor"
+        )
+        if outcome is None:
+            outcome = Outcome(fitted, starts)
+        outcome.final, outcome.final_starts = fitted, starts
+        horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
+        ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
+        far = fitted.fit.level > CLOSE
+        if far:
+            # a fit that the missing effect has bent is a poor place to judge from: the
+            # parameters as they were before it are judged as well, over the shortest horizon
+            search.restart(base_starts)
+            ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
+        outcome.left = ranked
+        tried = _short_list(ranked)
+        if not tried or len(fitted.effects) == MOST_EFFECTS:
+            break
+        before, before_starts = (base, base_starts) if far else (fitted, starts)
+        confirmed = []
+        for item in tried:
+            horizon = 1 if far else HORIZONS[-1]
+            found = search.confirm(before, before_starts, item, horizon)
+            confirmed.append((found.fit.cost, found, search.starts()))
+            say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+        confirmed.sort(key=lambda entry: entry[0])
+        _, best, best_starts = confirmed[0]
+        gain = _cost_at(fitted, best) - best.fit.cost
+        if gain < STRONG * allowance(best.fit.count, best.horizon) and not far:
+            break
+        base, base_starts = best, best_starts
+    assert outcome is not None
+    search.restart(outcome.final_starts)
+    prune(search, outcome)
+    weigh(search, outcome)
+    return outcome
+
+
+def _cost_at(fitted: Hypothesis, other: Hypothesis) -> float:
+    return fitted.fit.cost if fitted.horizon == other.horizon else np.inf
+
+
+def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:
+    """Both rankings, each candidate once, the first ranking's best before the second's."""
+    best = {}
+    for item in (*first, *second):
+        key = item.candidate.key
+        if key not in best or item.strength > best[key].strength:
+            best[key] = item
+    return sorted(best.values(), key=lambda item: -item.strength)
+
+
+def _short_list(ranked: list[Ranked]) -> list[Ranked]:
+    strong = [item for item in ranked if item.strength > STRONG]
+    return [item for item in strong if item.strength > NEAR * strong[0].strength][:SHORT_LIST]
+
+
+def prune(search: Search, outcome: Outcome) -> None:
+    """Drop every effect that a later one made needless; note what each of the others is worth."""
+    gains: dict[tuple[str, str], float] = {}
+    for effect in list(outcome.final.effects):
+        if len(outcome.final.effects) == 1:
+            nominal = outcome.nominal
+            base = nominal.fit.cost if nominal.horizon == outcome.final.horizon else np.inf
+            gains[effect.key] = base - outcome.final.fit.cost
+            continue
+        search.restart(outcome.final_starts)
+        rest = tuple(e for e in outcome.final.effects if e is not effect)
+        vector = without(search.parameters, outcome.final.fit.vector, effect)
+        found = search.climb(rest, vector, ceiling=CLOSE, iterations=3)
+        worth = np.inf if found.horizon < outcome.final.horizon else found.fit.cost - outcome.final.fit.cost
+        if worth < STRONG * allowance(found.fit.count, found.horizon):
+            search.say(f"{effect.effect} at {effect.location} is no longer needed")
+            outcome.final, outcome.final_starts = found, search.starts()
+        else:
+            gains[effect.key] = worth
+    search.restart(outcome.final_starts)
+    outcome.gains = [gains.get(effect.key, np.inf) for effect in outcome.final.effects]
+
+
+def weigh(search: Search, outcome: Outcome) -> None:
+    """Find the rivals that explain as much as an effect that was added."""
+    final, starts = outcome.final, outcome.final_starts
+    for place, effect in enumerate(final.effects):
+        rest = tuple(e for e in final.effects if e is not effect)
+        found = search.rivals(final, effect)
+        for item, share in found[:2]:
+            search.restart(starts)
+            vector = without(search.parameters, final.fit.vector, effect)
+            base = Hypothesis(rest, dataclasses.replace(final.fit, vector=vector), final.horizon)
+            rival = search.confirm(base, starts, item, final.horizon)
+            gain = outcome.gains[place]
+            loss = rival.fit.cost - final.fit.cost
+            worth = gain if np.isfinite(gain) else share
+            if (
+                rival.horizon == final.horizon
+                and loss < max(TIE * worth, 0.0)
+                and loss < allowance(final.fit.count, final.horizon)
+            ):
+                outcome.rivals.append((place, rival))
+    search.restart(starts)

@@ -1,0 +1,237 @@
+"""A hypothesis: the nominal arm with some effects, fitted; and what it leaves unexplained."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from .calibrate import Fit, Freedom, fit
+from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
+from .locate import LatentForce, latent_forces, strongest_frequencies
+from .parameters import Parameters
+from .screen import Score, scores, with_candidates
+from .shooting import Problem, Run
+
+HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
+# A model is never the plant. What it gets wrong shows more the longer it runs, and is no
+# missing effect: gains below this share of the readings, times the horizon, count as that.
+MODEL_ERROR = 0.002
+CHANCE = 10.0  # gain that noise alone may bring
+SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
+RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
+BARRED = 1e20  # precision that keeps a parameter where it is
+FREQUENCIES = 3  # of a periodic disturbance that are tried
+
+
+@dataclass
+class Hypothesis:
+    """Effects in the order added, and where their fit came to."""
+
+    effects: tuple[Candidate, ...]
+    fit: Fit
+    horizon: int
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate with its gain at the horizon where it stands out most."""
+
+    candidate: Candidate
+    step: tuple[float, ...]
+    nominal: np.ndarray
+    gain: float
+    strength: float
+    horizon: int
+    survival: float
+
+
+def allowance(count: int, horizon: int) -> float:
+    """Gain that noise and the model's own error may bring."""
+    return CHANCE + MODEL_ERROR * horizon * count
+
+
+def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
+    """Nominal parameters under their prior, the effects' amplitudes free, their shapes held loosely."""
+    count = len(parameters.nominal)
+    columns = list(range(count))
+    precision, centre, lowest = [1.0] * count, [0.0] * count, [-np.inf] * count
+    taken = {effect.key for effect in effects}
+    for part in parameters.effect:
+        if part.effect == "centrifugal_stiffening" and (part.effect, part.location) not in taken:
+            # the model's own terms of second order are not exact: a nuisance, not an effect
+            columns.append(parameters.position(part.effect, part.location, part.field))
+            precision.append(1 / SECOND_ORDER**2)
+            centre.append(0.0)
+            lowest.append(-np.inf)
+    for effect in effects:
+        for name in effect.amplitudes:
+            columns.append(parameters.position(*effect.key, name))
+            precision.append(0.0)
+            centre.append(0.0)
+            lowest.append(-np.inf if effect.effect in EITHER_SIGN else 0.0)
+        for name in effect.free:
+            value = dict(effect.shape)[name]
+            columns.append(parameters.position(*effect.key, name))
+            precision.append(1 / (0.5 * value) ** 2)
+            centre.append(value)
+            lowest.append(0.1 * value)
+    return Freedom(tuple(columns), np.array(precision), np.array(centre), np.array(lowest))
+
+
+def adopt(
+    parameters: Parameters, vector: np.ndarray, candidate: Candidate, step: tuple[float, ...]
+) -> np.ndarray:
+    """`vector` with the candidate in it, its amplitudes at `step`."""
+    vector = vector.copy()
+    for name, value in candidate.shape:
+        vector[parameters.position(*candidate.key, name)] = value
+    for name, value in zip(candidate.amplitudes, step, strict=False):
+        vector[parameters.position(*candidate.key, name)] = value
+    return vector
+
+
+def without(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> np.ndarray:
+    """`vector` with the effect absent again."""
+    vector = vector.copy()
+    for part in parameters.effect:
+        if (part.effect, part.location) == effect.key:
+            vector[parameters.position(*effect.key, part.field)] = part.value
+    return vector
+
+
+class Search:
+    """Fits hypotheses to runs and ranks what each one misses."""
+
+    def __init__(self, problem: Problem, runs: list[Run], say):
+        self.problem = problem
+        self.runs = runs
+        self.parameters = problem.setting.parameters
+        self.say = say
+
+    def starts(self) -> list[np.ndarray]:
+        """The starts of all pieces, to come back to."""
+        return [run.starts.copy() for run in self.runs]
+
+    def restart(self, starts: list[np.ndarray]) -> None:
+        """Back to these starts."""
+        for run, kept in zip(self.runs, starts, strict=True):
+            run.starts = kept.copy()
+
+    def settle(self, vector: np.ndarray, horizon: int = 1) -> Fit:
+        """The starts alone, parameters held."""
+        nothing = Freedom((), np.zeros(0), np.zeros(0), np.zeros(0))
+        return fit(self.problem, self.runs, vector, nothing, horizon, 2)
+
+    def climb(
+        self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],
+        iterations: int = 4,
+    ) -> Hypothesis:  # fmt: skip
+        """Fit over longer and longer horizons, stopping where the misfit is above `ceiling`."""
+        free = freedom(self.parameters, effects)
+        found = None
+        for horizon in HORIZONS:
+            if horizon > to:
+                break
+            found = fit(self.problem, self.runs, vector, free, horizon, iterations)
+            vector = found.vector
+            if found.level > ceiling:
+                break
+        assert found is not None
+        return Hypothesis(effects, found, horizon)
+
+    def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
+        """The forces that would make the model fit the first run."""
+        return latent_forces(self.problem, self.runs[0], vector, horizon)
+
+    def rank(
+        self,
+        vector: np.ndarray,
+        effects: tuple[Candidate, ...],
+        horizons: tuple[int, ...] = HORIZONS,
+        instead: Candidate | None = None,
+    ) -> list[Ranked]:
+        """Every candidate not yet in `effects`, the one that stands out most first.
+
+        Nominal parameters and the effects already there are refitted, to first order,
+        along with each candidate. With `instead`, one of the effects, the candidates are
+        judged as if that one were taken out; it is then among them itself.
+        """
+        parameters = self.parameters
+        free = freedom(parameters, effects)
+        frequencies = strongest_frequencies(self.latent(vector)[0], FREQUENCIES)
+        if instead is not None and instead.effect == "periodic_disturbance":
+            frequencies = [dict(instead.shape)["frequency"], *frequencies]
+        response = self.problem.predict(self.runs[0], vector)
+        pieces, _ = self.problem.pieces(self.runs[0], vector)
+        motion = Motion(
+            parameters, vector, response.states, response.end, np.asarray(pieces.command),
+            self.problem.setting.sample_time,
+        )  # fmt: skip
+        taken = {effect.key for effect in effects if effect is not instead}
+        tried = [c for c in candidates(parameters, motion, frequencies) if c.key not in taken]
+        columns = list(free.columns)
+        own = [] if instead is None else self._own_places(columns, instead)
+        linears = [with_candidates(self.problem, run, vector, columns, tried) for run in self.runs]
+        pull = -free.precision * (vector[columns] - free.centre)
+        best: dict[tuple[str, str], Ranked] = {}
+        for horizon in horizons:
+            parts = [
+                self.problem.condense(run, linear, horizon)
+                for run, (linear, _) in zip(self.runs, linears, strict=True)
+            ]
+            normal = sum(parts[1:], parts[0])
+            precision = free.precision.copy()
+            if own:
+                # as if the effect were out: its own columns are given back to the residual, then barred
+                amplitudes = np.array([vector[columns[k]] for k in own[: len(instead.amplitudes)]])
+                lost = normal.matrix[:, own[: len(instead.amplitudes)]] @ amplitudes
+                normal = dataclasses.replace(normal, vector=normal.vector + lost)
+                precision[own] = BARRED
+                pull = np.where(np.isin(np.arange(len(columns)), own), 0.0, pull)
+            for score in scores(normal, precision, pull, len(columns), tried, linears[0][1]):
+                if not plausible(score.candidate, score.step):
+                    continue
+                strength = score.gain / allowance(normal.count, horizon)
+                kept = best.get(score.candidate.key)
+                if kept is None or strength > kept.strength:
+                    best[score.candidate.key] = _ranked(score, strength, horizon)
+        return sorted(best.values(), key=lambda ranked: -ranked.strength)
+
+    def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
+        names = (*effect.amplitudes, *effect.free)
+        return [columns.index(self.parameters.position(*effect.key, name)) for name in names]
+
+    def rivals(self, final: Hypothesis, effect: Candidate) -> list[tuple[Ranked, float]]:
+        """Candidates that would explain nearly as much in place of `effect`, and what they would gain."""
+        if not effect.amplitudes:
+            return []
+        rest = self.rank(final.fit.vector, final.effects, (final.horizon,), instead=effect)
+        own = next((item.gain for item in rest if item.candidate.key == effect.key), None)
+        if own is None:
+            return []
+        return [
+            (item, item.gain) for item in rest if item.candidate.key != effect.key and item.gain > RIVAL * own
+        ]
+
+    def confirm(self, base: Hypothesis, starts: list[np.ndarray], ranked: Ranked, to: int) -> Hypothesis:
+        """The candidate added to `base` in full, fitted from `starts`."""
+        self.restart(starts)
+        vector = adopt(self.parameters, base.fit.vector, ranked.candidate, ranked.step)
+        return self.climb((*base.effects, ranked.candidate), vector, to=to, iterations=4)
+
+
+def _ranked(score: Score, strength: float, horizon: int) -> Ranked:
+    return Ranked(score.candidate, score.step, np.zeros(0), score.gain, strength, horizon, score.survival)
+
+
+class Outcome:
+    """What the search came to: the nominal fit, the final one, and rivals of each effect."""
+
+    def __init__(self, nominal: Hypothesis, starts: list[np.ndarray]):
+        self.nominal = nominal
+        self.nominal_starts = starts
+        self.final = nominal
+        self.final_starts = starts
+        self.rivals: list[tuple[int, Hypothesis]] = []
+        self.gains: list[float] = []
+        self.left: list[Ranked] = []
