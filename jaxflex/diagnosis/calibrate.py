@@ -61,7 +61,7 @@ def fit(
         return float(freedom.precision @ (v[columns] - freedom.centre) ** 2)
 
     def condensed(linears: list[Linearised]) -> Normal:
-        parts = [problem.condense(r, part, horizon) for r, part in zip(runs, linears, strict=True)]
+        parts = [problem.condense(r, part, horizon, damping) for r, part in zip(runs, linears, strict=True)]
         return sum(parts[1:], parts[0])
 
     def keep(cost, normal):
@@ -77,8 +77,10 @@ def fit(
     for _ in range(iterations):
         linears = [problem.linearise(run, vector, columns) for run in runs]
         first = condensed(linears)
-        kept = keep(first.cost + prior(vector), first)
+        kept = keep(first.held + prior(vector), first)
         before = kept[0]
+        if not np.isfinite(before):
+            break
         while damping < STEEPEST:
             current, cost = first, before
             for _ in range(CHORDS):
@@ -93,7 +95,7 @@ def fit(
                     current = condensed(
                         [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
                     )
-                new = current.cost + prior(vector)
+                new = current.held + prior(vector)
                 if not np.isfinite(new):
                     cost = np.inf
                     break
@@ -108,10 +110,9 @@ def fit(
                 break
             restore(kept)
             damping = max(10 * damping, 1e-4)
+            first = condensed(linears)
         restore(kept)
         if before - kept[0] < tolerance * first.count:
             break
     assert kept is not None
-    # the cost is that of the best starts, which are still one step ahead
-    problem.move_starts(kept[1], np.zeros(len(columns)))
     return Fit(vector, freedom, kept[0], prior(vector), kept[1])

@@ -142,7 +142,7 @@ class Motion:
         command: np.ndarray, dt: float,
     ):  # fmt: skip
         self.parameters = parameters
-        self.arm = parameters.build(jnp.asarray(vector))
+        self.arm = parameters.build(jnp.asarray(vector), 0.0)
         self.model = self.arm.assemble()
         self.command = command
         self.dt = dt

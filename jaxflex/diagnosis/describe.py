@@ -48,7 +48,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
         alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
     verdict = _verdict(outcome, levels, gone)
     vector = final.fit.vector
-    arm = parameters.build(jnp.asarray(vector))
+    arm = parameters.build(jnp.asarray(vector), 0.0)
     improved = _with_outside(file, search, arm, outcome.final.effects, vector)
     comparison = _comparison(prepared, before[1], after[1])
     return Diagnosis(

@@ -18,6 +18,7 @@ STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain wo
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
+LEAD = 0.03  # of the gain: what a hypothesis with more parameters must be better by
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 
 
@@ -77,8 +78,7 @@ def find(search: Search) -> Outcome:
             found = search.confirm(before, before_starts, item, horizon)
             confirmed.append((found.fit.cost, found, search.starts()))
             say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
-        confirmed.sort(key=lambda entry: entry[0])
-        _, best, best_starts = confirmed[0]
+        _, best, best_starts = simplest(confirmed, settled.cost if far else fitted.fit.cost)
         gain = _cost_at(fitted, best) - best.fit.cost
         if gain < STRONG * allowance(best.fit.count, best.horizon) and not far:
             break
@@ -88,6 +88,13 @@ def find(search: Search) -> Outcome:
     prune(search, outcome)
     weigh(search, outcome)
     return outcome
+
+
+def simplest(confirmed: list[tuple], before: float) -> tuple:
+    """Of the hypotheses that explain practically the same, the one with the fewest parameters."""
+    least = min(cost for cost, _, _ in confirmed)
+    tied = [entry for entry in confirmed if entry[0] - least <= LEAD * max(before - least, 0.0)]
+    return min(tied, key=lambda entry: (len(entry[1].effects[-1].amplitudes), entry[0]))
 
 
 def _cost_at(fitted: Hypothesis, other: Hypothesis) -> float:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..arm.arm import AssembledArm
 from ..drive import drive, drive_effects, effect_torques, has_current_state
@@ -42,7 +42,7 @@ class Pieces(eqx.Module):
     command: Float[Array, "pieces samples joints"]
     time: Float[Array, "pieces samples"]
     sample_time: float = eqx.field(static=True)
-    substeps: int = eqx.field(static=True)
+    substeps: Int[Array, ""]
 
 
 class Response(NamedTuple):
@@ -122,7 +122,7 @@ def run_piece(
     force: Float[Array, "samples coordinates"],
     time: Float[Array, " samples"],
     sample_time: float,
-    substeps: int,
+    substeps: Int[Array, ""],
 ) -> Response:
     """One piece from `start`, by classical Runge-Kutta steps of `sample_time / substeps`.
 
@@ -152,13 +152,13 @@ def run_piece(
             slope = derivative(model, t + ahead * h, moved(y, slope, ahead * h), u, f)
             return (y, slope, moved(total, slope, share)), None
 
-        def substep(y, _):
+        def substep(_, y):
             zero = tuple(jnp.zeros_like(v) for v in y)
             weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
             (_, _, total), _ = jax.lax.scan(stage, (y, zero, zero), weights)
-            return moved(y, total, h), None
+            return moved(y, total, h)
 
-        y, _ = jax.lax.scan(substep, x, None, length=substeps)
+        y = jax.lax.fori_loop(0, substeps, substep, x)
         after = truth(model, channels, t + sample_time, y, u)
         lagged = tuple(
             a * s + (m - a) * b + (1 - m) * c

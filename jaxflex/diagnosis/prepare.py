@@ -99,11 +99,13 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording]) -> Prepared:
         noise.append(max(floors[name].innovation, SMALLEST_NOISE * spread))
     colour = [np.array([1.0, *(-a for a in floors[name].ar)]) for name in outputs]
     length = max(round(PIECE / step), SHORTEST_PIECE)
-    parameters = Parameters(file, template(arm, outputs, _transition_rates(arm, pieces, step)))
+    effects = template(arm, outputs, _transition_rates(arm, pieces, step))
+    substeps = substeps_for(dataclasses.replace(arm, effects=()), step)
+    parameters = Parameters(file, effects)
     model = parameters.arm.assemble()
     setting = Setting(
         parameters, outputs, np.array(noise), colour, step, length,
-        substeps_for(parameters.arm, step), np.full(state_size(model, outputs), 1e3),
+        substeps, np.full(state_size(model, outputs), 1e3),
     )  # fmt: skip
     runs = [make_run(f"run {i}", piece, inputs, setting) for i, piece in enumerate(pieces, 1)]
     if len(runs) > 1:

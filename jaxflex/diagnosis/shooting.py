@@ -23,6 +23,7 @@ from ..arm.arm import Arm, AssembledArm
 from .parameters import Parameters
 from .plant import Direction, Instruments, Pieces, Response, respond, slopes, state_size
 
+LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LANES = 12  # directions differentiated side by side: one compiled program whatever their number
 
 
@@ -74,15 +75,20 @@ class Normal:
 
     matrix: np.ndarray
     vector: np.ndarray
-    cost: float
+    cost: float  # of the best starts
+    held: float  # of the starts as they are
     count: int
     back: list = field(default_factory=list)  # what gives the starts once d is known
 
     def __add__(self, other: "Normal") -> "Normal":
         return Normal(
-            self.matrix + other.matrix, self.vector + other.vector,
-            self.cost + other.cost, self.count + other.count, [*self.back, *other.back],
-        )  # fmt: skip
+            self.matrix + other.matrix,
+            self.vector + other.vector,
+            self.cost + other.cost,
+            self.held + other.held,
+            self.count + other.count,
+            [*self.back, *other.back],
+        )
 
 
 def delayed(times: np.ndarray, command: np.ndarray, delay: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -132,17 +138,27 @@ class Problem:
             for joint in range(len(setting.parameters.arm.joints))
         ]
 
+    def substeps(self, vector: np.ndarray) -> int:
+        """Integration steps in a sample interval for these parameters."""
+        s = self.setting
+        return s.parameters.substeps(vector, s.sample_time, s.substeps)
+
+    def arm(self, vector: np.ndarray) -> Arm:
+        """The arm as it is integrated."""
+        step = self.setting.sample_time / self.substeps(vector)
+        return self.setting.parameters.build(jnp.asarray(vector), step)
+
     def _constants(self, vector: np.ndarray) -> AssembledArm:
-        return self.setting.parameters.build(jnp.asarray(vector)).assemble()
+        return self.arm(vector).assemble()
 
     def _tangents(self, vector: np.ndarray, directions: np.ndarray) -> Any:
-        build, at = self.setting.parameters.build, jnp.asarray(vector)
-        arm = build(at)
+        step, at = self.setting.sample_time / self.substeps(vector), jnp.asarray(vector)
 
         def along(direction):
-            return eqx.filter(jax.jvp(build, (at,), (direction,))[1], eqx.is_inexact_array)
+            moved = jax.jvp(lambda v: self.setting.parameters.build(v, step), (at,), (direction,))[1]
+            return eqx.filter(moved, eqx.is_inexact_array)
 
-        return _assembled_along(arm, jax.vmap(along)(jnp.asarray(directions)))
+        return _assembled_along(self.arm(vector), jax.vmap(along)(jnp.asarray(directions)))
 
     def instruments(self, vector: np.ndarray) -> Instruments:
         """The instruments that a parameter vector stands for."""
@@ -176,7 +192,9 @@ class Problem:
         time = run.times[0] + np.arange(total).reshape(shape) * s.sample_time
         command = np.stack([cut(c) for c in columns], -1)
         slope = np.stack([cut(c) for c in rates], -1)
-        return Pieces(jnp.asarray(command), jnp.asarray(time), s.sample_time, s.substeps), slope
+        return Pieces(
+            jnp.asarray(command), jnp.asarray(time), s.sample_time, jnp.asarray(self.substeps(vector))
+        ), slope
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
@@ -246,12 +264,15 @@ class Problem:
         rows = [self.instruments(row) for row in unit]
         return Instruments(*(np.stack([r[k] - zero[k] for r in rows]) for k in range(4)))
 
-    def condense(self, run: Run, linear: Linearised, horizon: int) -> Normal:
-        """Least squares in the columns, over horizons of `horizon` pieces, starts eliminated."""
+    def condense(self, run: Run, linear: Linearised, horizon: int, damping: float = 0.0) -> Normal:
+        """Least squares in the columns, over horizons of `horizon` pieces, starts eliminated.
+
+        `damping` of the starts, as a share of what the readings say of them.
+        """
         s = self.setting
         columns = linear.by_column.shape[-1]
         states = run.starts.shape[1]
-        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0)
+        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0, 0)
         cuts = np.unique(
             np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
         )
@@ -271,6 +292,9 @@ class Problem:
                 by_start, by_column = through @ by_start, through @ by_column + linear.end_by_column[j]
                 offset = through @ offset + linear.gap[j]
             table = np.concatenate(rows)
+            if not np.isfinite(table).all() or np.abs(table).max() > LOST:
+                total.held = total.cost = np.inf
+                return total
             for c, filter_ in enumerate(s.colour):
                 if len(filter_) > 1:
                     table[:, c] = lfilter(filter_, [1.0], table[:, c], axis=0)
@@ -278,12 +302,13 @@ class Problem:
             gram = table.T @ table
             a = slice(0, states)
             b = slice(states, states + columns)
-            inner = gram[a, a] + np.diag(1 / s.start_spread**2)
+            inner = gram[a, a] + np.diag(1 / s.start_spread**2 + damping * np.diag(gram[a, a]))
             solved = np.linalg.solve(inner, gram[a, states:])
             total = total + Normal(
                 gram[b, b] - gram[b, a] @ solved[:, :-1],
                 gram[b, -1] - gram[b, a] @ solved[:, -1],
                 gram[-1, -1] - gram[-1, a] @ solved[:, -1],
+                gram[-1, -1],
                 int(run.valid[first:last].sum()) * len(s.channels),
                 [(run, kept, solved)],
             )
