@@ -1,0 +1,252 @@
+"""What can be hidden: each effect in its own physical form, written into a rig at a given size.
+
+An effect is a function of the rig, the size and random numbers for its secondary choices. It
+changes the rig and returns where it acts and the values that define it. Size zero is absence.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .rigs import NOISE, RUNS, SAMPLES, Rig
+from .simulator import CHANNELS, SAMPLE
+
+Hidden = tuple[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """`hide(rig, size, draw)`; `guess` a size that shows, `most` the largest that is believable."""
+
+    name: str
+    hide: Callable[[Rig, float, np.random.Generator], Hidden]
+    guess: float
+    most: float
+    needs_link: bool
+
+
+EFFECTS: dict[str, Effect] = {}
+
+
+def effect(name: str, guess: float, most: float, link: bool = False):
+    """Register a function under the name of its effect."""
+
+    def keep(hide):
+        EFFECTS[name] = Effect(name, hide, guess, most, link)
+        return hide
+
+    return keep
+
+
+def available(plant: str) -> dict[str, Effect]:
+    """The effects that `plant` can have."""
+    return {k: e for k, e in EFFECTS.items() if plant != "axis" or not e.needs_link}
+
+
+# ---- joint
+
+
+@effect("coulomb_friction", 0.005, 0.2)
+def coulomb_friction(rig, size, draw):
+    rig.forces |= {"dry": rig.forces["dry"] + size, "presliding": draw.uniform(2e-4, 8e-4)}
+    return "joint_1", {"torque": size}
+
+
+@effect("stribeck_friction", 0.005, 0.2)
+def stribeck_friction(rig, size, draw):
+    """A Coulomb level with more near rest: `torque` is the excess."""
+    excess, rate = size * draw.uniform(0.6, 1.2), draw.uniform(0.1, 0.4)
+    rig.forces |= {"dry": rig.forces["dry"] + size, "stribeck": excess, "stribeck_rate": rate}
+    return "joint_1", {"torque": excess, "stribeck_rate": rate, "coulomb_torque": size}
+
+
+@effect("asymmetric_friction", 0.005, 0.2)
+def asymmetric_friction(rig, size, draw):
+    """Dry friction that differs with direction: `torque` is half the difference."""
+    share = draw.uniform(0.4, 0.8) * draw.choice([-1, 1])
+    rig.forces |= {"dry": rig.forces["dry"] + size, "asymmetry": share}
+    return "joint_1", {"torque": size * share, "coulomb_torque": size}
+
+
+@effect("quadratic_drag", 5e-4, 0.05)
+def quadratic_drag(rig, size, draw):
+    rig.forces["drag"] = size
+    return "joint_1", {"coefficient": size}
+
+
+@effect("cable_stiffness", 0.02, 3.0)
+def cable_stiffness(rig, size, draw):
+    rest = draw.uniform(-0.2, 0.2)
+    rig.forces |= {"cable": size, "cable_rest": rest}
+    return "joint_1", {"stiffness": size, "rest_angle": rest}
+
+
+@effect("cogging_torque", 0.004, 0.2)
+def cogging_torque(rig, size, draw):
+    order, phase = float(draw.choice([6, 8, 12])), draw.uniform(0, 2 * np.pi)
+    rig.forces |= {"ripple": size, "ripple_order": order, "ripple_phase": phase}
+    return "joint_1", {"sine": size * np.cos(phase), "cosine": size * np.sin(phase), "order": order}
+
+
+@effect("load_torque_bias", 0.004, 0.2)
+def load_torque_bias(rig, size, draw):
+    torque = size * draw.choice([-1, 1])
+    rig.forces["load"] = torque
+    return "joint_1", {"torque": torque}
+
+
+@effect("joint_flexibility", 0.01, 2.0)
+def joint_flexibility(rig, size, draw):
+    """A spring between rotor and hub; the encoder sits on the rotor."""
+    rig.body["joint_compliance"] = size
+    return "joint_1", {"compliance": size, "stiffness": 1 / size if size else np.inf}
+
+
+@effect("backlash", 1e-3, 0.1)
+def backlash(rig, size, draw):
+    """Rotor and hub apart, touching on either side of a gap; the encoder sits on the rotor."""
+    rig.body["backlash"] = rig.forces["backlash"] = size / 2
+    rig.forces |= {"contact": 500.0 if size else 0.0, "contact_damping": 0.1 if size else 0.0}
+    return "joint_1", {"gap": size}
+
+
+# ---- drive
+
+
+@effect("voltage_saturation", 0.3, 0.95)
+def voltage_saturation(rig, size, draw):
+    """`size`: the share cut off the largest voltage that the run would ask for."""
+    rig.forces["limit"] = rig.peak["voltage"] * (1 - size)
+    return "joint_1", {"limit": rig.forces["limit"]}
+
+
+@effect("voltage_dead_zone", 0.05, 2.0)
+def voltage_dead_zone(rig, size, draw):
+    rig.forces["dead_zone"] = size
+    return "joint_1", {"width": size}
+
+
+@effect("input_delay", 0.002, 0.04)
+def input_delay(rig, size, draw):
+    rig.forces["delay"] = size
+    return "joint_1", {"delay": size}
+
+
+@effect("torque_constant", 0.1, 2.0)
+def torque_constant(rig, size, draw):
+    """Wrong by the factor 1 + size or its inverse; half the time the back-EMF constant goes with it."""
+    factor, follows = (1 + size) ** draw.choice([-1, 1]), bool(draw.integers(2))
+    rig.body["torque_constant"] *= factor
+    rig.body["back_emf_constant"] *= factor if follows else 1.0
+    return "joint_1", {"torque_constant": rig.body["torque_constant"], "back_emf_follows": float(follows)}
+
+
+@effect("winding_heating", 0.02, 2.0)
+def winding_heating(rig, size, draw):
+    """Resistance grows by `size` of itself a second at one ampere, and falls back slowly."""
+    time = draw.uniform(6, 20)
+    rig.forces |= {"warming": size, "cooling": 1 / time}
+    return "joint_1", {"rate": size, "time_constant": time}
+
+
+# ---- body
+
+
+@effect("payload_mass", 0.01, 0.3, link=True)
+def payload_mass(rig, size, draw):
+    rig.body["payload_mass"] += size
+    return "tip", {"mass": rig.body["payload_mass"], "added": size}
+
+
+@effect("hub_inertia", 2e-4, 0.05)
+def hub_inertia(rig, size, draw):
+    rig.body["hub_inertia"] += size
+    return "joint_1", {"inertia": rig.body["hub_inertia"], "added": size}
+
+
+@effect("root_compliance", 0.01, 2.0, link=True)
+def root_compliance(rig, size, draw):
+    """A spring between hub and link; the tip is seen from the hub."""
+    rig.body["root_compliance"] = size
+    return "link_1", {"compliance": size, "stiffness": 1 / size if size else np.inf}
+
+
+@effect("gravity", 0.2, 9.81, link=True)
+def gravity(rig, size, draw):
+    """A tilted base: the part of gravity in the plane, along -y or up to half a radian from it."""
+    direction = draw.choice([0.0, draw.uniform(-0.5, 0.5)])
+    rig.forces |= {"weight": size, "weight_direction": direction}
+    return "base", {"gravity": size, "direction": direction}
+
+
+@effect("structural_damping", 0.01, 0.5, link=True)
+def structural_damping(rig, size, draw):
+    """More damping in the link: the same ratio in every mode, or rising with frequency (Kelvin-Voigt)."""
+    rise = float(draw.integers(2))
+    rig.body |= {"extra_damping": size, "rise": rise}
+    return "link_1", {"damping_ratio": rig.body["damping_ratio"] + size, "added": size, "rise": rise}
+
+
+@effect("centrifugal_stiffening", 1.0, 60.0, link=True)
+def centrifugal_stiffening(rig, size, draw):
+    """Foreshortening; 1 is what the link itself has, more stands for an axial load that turns with it."""
+    rig.body["foreshortening"] = size
+    return "link_1", {"factor": size}
+
+
+@effect("viscous_friction", 5e-4, 0.2)
+def viscous_friction(rig, size, draw):
+    rig.body["viscous_friction"] += size
+    return "joint_1", {"coefficient": rig.body["viscous_friction"], "added": size}
+
+
+# ---- sensors
+
+
+def sensor(rig: Rig, draw, candidates: tuple[str, ...]) -> tuple[int, str]:
+    """One of the logged channels among the candidates: its index and its name in the recording."""
+    name = str(draw.choice([c for c in candidates if c in rig.nominal.channels]))
+    return CHANNELS.index(name), f"{name}_1"
+
+
+@effect("sensor_bias", 4.0, 1e4)
+def sensor_bias(rig, size, draw):
+    c, name = sensor(rig, draw, ("current", "tip_deflection", "strain"))
+    value = size * NOISE[CHANNELS[c]] * draw.choice([-1, 1])
+    rig.faults["bias"][c] += value
+    return name, {"bias": value}
+
+
+@effect("sensor_gain", 0.05, 2.0)
+def sensor_gain(rig, size, draw):
+    c, name = sensor(rig, draw, ("angle", "current", "tip_deflection", "strain"))
+    factor = (1 + size) ** draw.choice([-1, 1])
+    rig.faults["gain"][c] *= factor
+    return name, {"gain": factor}
+
+
+@effect("sensor_lag", 0.004, 0.3)
+def sensor_lag(rig, size, draw):
+    c, name = sensor(rig, draw, ("angle", "current", "tip_deflection", "strain"))
+    rig.faults["lag"][c] = size
+    return name, {"lag": size}
+
+
+@effect("sensor_drift", 1.0, 3e3)
+def sensor_drift(rig, size, draw):
+    c, name = sensor(rig, draw, ("current", "tip_deflection", "strain"))
+    value = size * NOISE[CHANNELS[c]] * draw.choice([-1, 1])
+    rig.faults["drift"][c] = value
+    return name, {"rate": value}
+
+
+# ---- from outside
+
+
+@effect("periodic_disturbance", 0.003, 0.3)
+def periodic_disturbance(rig, size, draw):
+    frequency, phase = draw.uniform(1.5, 12.0), draw.uniform(0, 2 * np.pi, RUNS)
+    times = np.arange(SAMPLES)[:, None] * SAMPLE
+    rig.disturbance = rig.disturbance + size * np.sin(2 * np.pi * frequency * times + phase)
+    return "joint_1", {"torque": size, "frequency": frequency}

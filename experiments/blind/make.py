@@ -1,0 +1,226 @@
+"""Make recordings with a hidden effect: `python -m experiments.blind.make -o DIR`."""
+
+import argparse
+import copy
+import itertools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from .drive import record
+from .effects import available
+from .gaps import measure
+from .outside import CATALOGUE, OUTSIDE
+from .rigs import NOISE, RUNS, SAMPLES, UNITS, Rig, generator, true_rig
+from .simulator import CHANNELS, COUNT, SAMPLE
+
+COARSE, FINE = 10, 40  # steps a sample: to find sizes, and for the recording (20 kHz)
+ROUNDS = 6
+COLOUR = 0.9  # correlation of coloured noise from one sample to the next
+Truth = tuple[tuple[str, str, dict[str, float]], ...]
+
+
+@dataclass(frozen=True)
+class Case:
+    """An arm file, two recordings, and what is hidden in them.
+
+    - `truth`: (effect, location, values) of each hidden effect; empty for nothing. Names
+      that begin with `outside:` are in no catalogue
+    - `arm_toml`: the text of the nominal arm file
+    - `runs`: a dict of columns a run, by header, such as `"angle_1 [rad]"`
+    - `gap`: `wanted`; `raw` and `projected` over the noise floor, by channel; `size`, the
+      projected gap in the channel where it is largest; `survival`; `reached`, false where
+      no believable size of the effect gives the gap wanted
+    """
+
+    name: str
+    truth: Truth
+    arm_toml: str
+    runs: list[dict[str, np.ndarray]]
+    gap: dict[str, Any]
+
+
+def make_cases(
+    plant: str,
+    effects: list[tuple[str, ...]],
+    gaps: list[float],
+    seeds: list[int],
+    noise: str = "white",
+) -> list[Case]:
+    """Cases for every combination; `()` among the effects is nothing hidden, once a seed.
+
+    In a case with several effects each has, alone, the gap asked for.
+    """
+    known = available(plant)
+    for name in itertools.chain.from_iterable(effects):
+        if name not in known:
+            raise ValueError(f"{name!r} cannot be hidden in {plant!r}; there are {', '.join(known)}.")
+    jobs = [(e, g, s) for e in effects for g in (gaps if e else [0.0]) for s in seeds]
+    keys = list(dict.fromkeys((e, s) for e, _, s in jobs))
+    plain = dict(zip(keys, with_peaks([true_rig(plant, key) for key in keys]), strict=True))
+    singles = list(dict.fromkeys(((e, s), name, g) for e, g, s in jobs for name in e))
+    sizes = find_sizes([(plain[key], key, name, g) for key, name, g in singles])
+    size_of = dict(zip(singles, sizes, strict=True))
+    rigs, truths = [], []
+    for names, gap, seed in jobs:
+        rig, truth = copy.deepcopy(plain[names, seed]), []
+        for name in names:
+            size = size_of[(names, seed), name, gap]
+            location, values = hide(rig, (names, seed), name, size)
+            truth.append((name, location, {k: float(v) for k, v in values.items()}))
+        rigs.append(rig)
+        truths.append(tuple(truth))
+    measured, voltage, read = measure([plain[e, s] for e, _, s in jobs], rigs, FINE)
+    cases = []
+    for n, (names, gap, seed) in enumerate(jobs):
+        figures = measured[n]
+        title = "+".join(names).replace(":", "_") or "nothing"
+        found = {
+            "wanted": gap, "raw": figures.raw, "projected": figures.projected, "size": figures.size,
+            "survival": figures.survival, "reached": bool(not names or figures.size > 0.7 * gap),
+        }  # fmt: skip
+        draw = generator(plant, names, gap, seed, noise)
+        runs = [
+            columns(rigs[n], voltage[:, n, r], read[:, :, n, r], generator_noise(draw, noise))
+            for r in range(RUNS)
+        ]
+        name = f"{title}-{gap:g}-{seed}" if names else f"{title}-{seed}"
+        cases.append(Case(name, truths[n], rigs[n].nominal.toml(), runs, found))
+    return cases
+
+
+def hide(rig: Rig, key: object, name: str, size: float):
+    """Write the effect into the rig; its secondary choices depend on the key alone."""
+    return available("any")[name].hide(rig, size, generator("effect", key, name))
+
+
+def with_peaks(rigs: list[Rig]) -> list[Rig]:
+    """The rigs, knowing how far they go with nothing hidden."""
+    voltage, read, _ = record(rigs, COARSE)
+    for n, rig in enumerate(rigs):
+        rig.peak = {"voltage": float(np.abs(voltage[:, n]).max()), "angle": float(read[:, 0, n].max())}
+    return rigs
+
+
+def find_sizes(tasks: Sequence[tuple[Rig, object, str, float]]) -> list[float]:
+    """The size of each effect that gives the projected gap asked for, by secants of its logarithm.
+
+    Where no size up to the largest believable one does, that one.
+    """
+    known = available("any")
+    top = np.log([known[name].most for _, _, name, _ in tasks])
+    wanted = np.log([gap for *_, gap in tasks])
+    now = np.minimum(np.log([known[name].guess for _, _, name, _ in tasks]) + wanted - np.log(3.0), top)
+    before: list[tuple[float, float] | None] = [None] * len(tasks)
+    best = [(np.inf, 0.0)] * len(tasks)
+    open_tasks = list(range(len(tasks)))
+    for _ in range(ROUNDS):
+        if not open_tasks:
+            break
+        rigs = []
+        for t in open_tasks:
+            rig, key, name, _ = tasks[t]
+            rigs.append(copy.deepcopy(rig))
+            hide(rigs[-1], key, name, float(np.exp(now[t])))
+        measured, _, _ = measure([tasks[t][0] for t in open_tasks], rigs, COARSE)
+        for t, gap in zip(list(open_tasks), measured, strict=True):
+            value = np.log(max(gap.size, 1e-6)) if np.isfinite(gap.size) else np.inf
+            miss = value - wanted[t]
+            best[t] = min(best[t], (abs(miss), now[t]))
+            if abs(miss) < 0.05 or (miss < 0 and now[t] >= top[t]):
+                open_tasks.remove(t)
+                continue
+            slope, last = 1.0, before[t]
+            if last is not None and np.isfinite(miss + last[1]) and abs(now[t] - last[0]) > 1e-9:
+                slope = np.clip((miss - last[1]) / (now[t] - last[0]), 0.3, 3.0)
+            before[t] = (now[t], miss)
+            change = -1.5 if not np.isfinite(miss) else np.clip(-miss / slope, -2.0, 2.0)
+            now[t] = min(now[t] + change, top[t])
+    return [float(np.exp(at)) for _, at in best]
+
+
+def generator_noise(draw: np.random.Generator, kind: str):
+    """A function of a standard deviation, which returns a noise of that size."""
+    if kind not in ("white", "coloured"):
+        raise ValueError(f"noise = {kind!r}; allowed are 'white' and 'coloured'.")
+
+    def noise(deviation: float) -> np.ndarray:
+        out = draw.standard_normal(SAMPLES)
+        if kind == "coloured":
+            for k in range(1, SAMPLES):
+                out[k] = COLOUR * out[k - 1] + np.sqrt(1 - COLOUR**2) * out[k]
+        return deviation * out
+
+    return noise
+
+
+def columns(rig: Rig, voltage: np.ndarray, read: np.ndarray, noise) -> dict[str, np.ndarray]:
+    """One run as it is logged: the encoder counts, everything else has noise."""
+    out = {"time [s]": np.arange(SAMPLES) * SAMPLE, "voltage_1 [V]": voltage}
+    for channel in CHANNELS:
+        if channel in rig.nominal.channels:
+            signal = read[:, CHANNELS.index(channel)]
+            logged = (
+                np.round(signal / COUNT) * COUNT if channel == "angle" else signal + noise(NOISE[channel])
+            )
+            out[f"{channel}_1 [{UNITS[channel]}]"] = logged
+    return out
+
+
+def write_case(case: Case, folder: str | Path) -> None:
+    """Write `arm.toml`, `run_1.csv`, `run_2.csv` and `truth.json` into `folder`."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "arm.toml").write_text(case.arm_toml)
+    for number, run in enumerate(case.runs, 1):
+        table = np.stack(list(run.values()), axis=1)
+        shape = ["%.4f"] + ["%.7g"] * (table.shape[1] - 1)
+        np.savetxt(
+            folder / f"run_{number}.csv", table, fmt=shape, delimiter=",", header=",".join(run), comments=""
+        )
+    hidden = [{"name": n, "location": where, "values": values} for n, where, values in case.truth]
+    truth = {"name": case.name, "hidden": hidden, "gap": case.gap}
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+
+
+def chosen(plant: str, words: str) -> list[tuple[str, ...]]:
+    """Effects from the command line: `all`, `outside`, `nothing`, or names; `a+b` for a pair."""
+    known = available(plant)
+    out: list[tuple[str, ...]] = []
+    for word in words.split(","):
+        groups = {"all": CATALOGUE, "outside": OUTSIDE}
+        if word in groups:
+            out += [(name,) for name in groups[word] if name in known]
+        else:
+            out.append(() if word == "nothing" else tuple(word.split("+")))
+    return out
+
+
+def main() -> None:
+    """Write one folder a case."""
+    jax.config.update("jax_enable_x64", True)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-o", type=Path, required=True, help="where the folders go")
+    parser.add_argument("--plant", default="single_link")
+    parser.add_argument("--effects", default="all", help="all, outside, nothing, or names; a+b for a pair")
+    parser.add_argument("--gaps", default="1,3,10", help="projected gap over the noise floor")
+    parser.add_argument("--seeds", type=int, default=3, help="how many, from 0")
+    parser.add_argument("--noise", default="white", choices=["white", "coloured"])
+    given = parser.parse_args()
+    gaps = [float(g) for g in given.gaps.split(",")]
+    cases = make_cases(
+        given.plant, chosen(given.plant, given.effects), gaps, list(range(given.seeds)), given.noise
+    )
+    for case in cases:
+        write_case(case, given.o / case.name)
+        size, survival = case.gap["size"], case.gap["survival"]
+        print(f"{case.name:45s} gap {size:7.2f}  survival {survival:5.2f}  {case.truth}")
+
+
+if __name__ == "__main__":
+    main()
