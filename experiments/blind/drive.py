@@ -68,8 +68,8 @@ def resample(signal: np.ndarray, rate: float) -> np.ndarray:
 def replay(plain: Sequence[Rig], rigs: Sequence[Rig], voltage, states, substeps: int = 10):
     """What the rigs `plain` read under the logged voltage of `rigs`, started anew every SEGMENT.
 
-    Each segment starts in the state that the recorded rig had there. Returns
-    [samples of a segment, channels, rigs, runs, segments].
+    Each segment starts in the state that the recorded rig had there. Returns the readings
+    [samples of a segment, channels, rigs, runs, segments], and the starts likewise.
     """
     plant, homes = plant_arrays(plain, substeps)
     _, guests = plant_arrays(rigs, substeps)
@@ -83,7 +83,8 @@ def replay(plain: Sequence[Rig], rigs: Sequence[Rig], voltage, states, substeps:
     plant |= {k: np.full(count * each, v) for k, v in idle.items()}
     nothing = np.zeros_like(cut)
     _, read, _ = run_lanes(plant, start, nothing, cut, nothing, substeps)
-    return read.reshape(SEGMENT, len(CHANNELS), count, RUNS, SEGMENTS)
+    shape = (count, RUNS, SEGMENTS)
+    return read.reshape(SEGMENT, len(CHANNELS), *shape), start.reshape(STATES, *shape)
 
 
 def translation(home: dict, guest: dict) -> np.ndarray:

@@ -4,7 +4,6 @@ import argparse
 import copy
 import itertools
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from .gaps import measure
 from .outside import CATALOGUE, OUTSIDE
 from .rigs import NOISE, RUNS, SAMPLES, UNITS, Rig, generator, true_rig
 from .simulator import CHANNELS, COUNT, SAMPLE
+from .sizes import COARSE, find_sizes, hide
 
-COARSE, FINE = 10, 40  # steps a sample: to find sizes, and for the recording (20 kHz)
-ROUNDS = 6
+FINE = 40  # steps a sample: 20 kHz
 COLOUR = 0.9  # correlation of coloured noise from one sample to the next
 Truth = tuple[tuple[str, str, dict[str, float]], ...]
 
@@ -94,54 +93,12 @@ def make_cases(
     return cases
 
 
-def hide(rig: Rig, key: object, name: str, size: float):
-    """Write the effect into the rig; its secondary choices depend on the key alone."""
-    return available("any")[name].hide(rig, size, generator("effect", key, name))
-
-
 def with_peaks(rigs: list[Rig]) -> list[Rig]:
     """The rigs, knowing how far they go with nothing hidden."""
     voltage, read, _ = record(rigs, COARSE)
     for n, rig in enumerate(rigs):
         rig.peak = {"voltage": float(np.abs(voltage[:, n]).max()), "angle": float(read[:, 0, n].max())}
     return rigs
-
-
-def find_sizes(tasks: Sequence[tuple[Rig, object, str, float]]) -> list[float]:
-    """The size of each effect that gives the projected gap asked for, by secants of its logarithm.
-
-    Where no size up to the largest believable one does, that one.
-    """
-    known = available("any")
-    top = np.log([known[name].most for _, _, name, _ in tasks])
-    wanted = np.log([gap for *_, gap in tasks])
-    now = np.minimum(np.log([known[name].guess for _, _, name, _ in tasks]) + wanted - np.log(3.0), top)
-    before: list[tuple[float, float] | None] = [None] * len(tasks)
-    best = [(np.inf, 0.0)] * len(tasks)
-    open_tasks = list(range(len(tasks)))
-    for _ in range(ROUNDS):
-        if not open_tasks:
-            break
-        rigs = []
-        for t in open_tasks:
-            rig, key, name, _ = tasks[t]
-            rigs.append(copy.deepcopy(rig))
-            hide(rigs[-1], key, name, float(np.exp(now[t])))
-        measured, _, _ = measure([tasks[t][0] for t in open_tasks], rigs, COARSE)
-        for t, gap in zip(list(open_tasks), measured, strict=True):
-            value = np.log(max(gap.size, 1e-6)) if np.isfinite(gap.size) else np.inf
-            miss = value - wanted[t]
-            best[t] = min(best[t], (abs(miss), now[t]))
-            if abs(miss) < 0.05 or (miss < 0 and now[t] >= top[t]):
-                open_tasks.remove(t)
-                continue
-            slope, last = 1.0, before[t]
-            if last is not None and np.isfinite(miss + last[1]) and abs(now[t] - last[0]) > 1e-9:
-                slope = np.clip((miss - last[1]) / (now[t] - last[0]), 0.3, 3.0)
-            before[t] = (now[t], miss)
-            change = -1.5 if not np.isfinite(miss) else np.clip(-miss / slope, -2.0, 2.0)
-            now[t] = min(now[t] + change, top[t])
-    return [float(np.exp(at)) for _, at in best]
 
 
 def generator_noise(draw: np.random.Generator, kind: str):

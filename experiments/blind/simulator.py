@@ -138,7 +138,7 @@ def run(plant, start, reference, feedforward, disturbance, substeps, keep):
 
         def substep(n, held):
             (state, *memory), shown = held
-            voltage = jnp.where(n >= late, newer, older)
+            voltage = older + (newer - older) * jnp.clip(n + 1 - late, 0.0, 1.0)
             voltage = jnp.clip(voltage, -plant["limit"], plant["limit"])
             voltage = voltage - jnp.clip(voltage, -plant["dead_zone"], plant["dead_zone"])
             now = load + (next_load - load) * (n / substeps)
