@@ -11,7 +11,7 @@ from .structure import COORDINATES, STATES, exact_step, structure
 SEGMENT = 500  # samples that a replay lasts
 SEGMENTS = SAMPLES // SEGMENT
 LANES = 128  # at a time, so that one program serves every number of rigs
-ROWS = ("motor", "hub", "frame", "deflection", "tip", "strain", "gravity", "mode")
+ROWS = ("motor", "hub", "frame", "deflection", "tip", "strain", "gravity", "mode", "first_moment")
 ELECTRICAL = ("resistance", "torque_constant", "back_emf_constant")
 
 

@@ -97,8 +97,10 @@ def forces(plant, memory, time, disturbance, step):
     held = spin * sum(m * q * q for m, q in zip(p["mode"], x, strict=True))
     stop = -p["stop"] * jnp.maximum(dot(p["tip"], x) - p["stop_place"], 0.0)
     harden = -p["hardening"] * dot(p["deflection"], x) ** 3
-    weight = -p["weight"] * jnp.cos(angle + p["weight_direction"])
-    acting = (on_motor - push, on_hub + push, (momentum - held) / step, stop, harden, weight)
+    heading = angle + p["weight_direction"]
+    weight = -p["weight"] * jnp.cos(heading)
+    hanging = p["weight"] * jnp.sin(heading) * (dot(p["gravity"], x) - p["first_moment"] * angle)
+    acting = (on_motor - push, on_hub + push, (momentum - held) / step + hanging, stop, harden, weight)
     return acting, spin * spin, loss, (bend, held, heat)
 
 

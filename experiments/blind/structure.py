@@ -23,13 +23,14 @@ LINK_MODES = 4
 def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     """Matrices of the plant with physical parameters `p` (SI).
 
-    Returns `system` [STATES, STATES + 1], the rate of (current, coordinates, rates) from
-    (state, voltage); the rows `motor`, `hub`, `frame`, `deflection`, `tip`, `strain` and
-    `gravity` that read from the coordinates (`motor` and `hub` relative to the stator, `frame` the
-    absolute angle of the hub), and `mode`, 1 at the coordinates of the link's
-    modes; `mobility`, the inverse mass matrix; `tension`, the stiffness that 1 rad/s adds by
-    foreshortening; and `hub_angle`, `modes`, which place a plant with rigid connections in
-    the state of this one.
+    Returns
+
+    - `system` [STATES, STATES + 1], the rate of (current, coordinates, rates) from (state, voltage)
+    - rows that read from the coordinates: `motor` and `hub` (angles relative to the stator),
+      `frame` (absolute angle of the hub), `deflection` and `tip` [m], `strain`, `gravity` (mass
+      times height [kg m] of the arm along x), and `mode`, 1 at the coordinates of link modes
+    - `first_moment` [kg m] of the straight link; `mobility`, the inverse mass matrix;
+      `tension`, the stiffness that turning at 1 rad/s adds by foreshortening
     """
     loose = p["backlash"] > 0
     springs = {
@@ -61,6 +62,7 @@ def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     mass = mass + (1 - ROTOR_SHARE) * p["hub_inertia"] * np.outer(hub, hub)
     stiff, damp = np.zeros((size, size)), p["viscous_friction"] * np.outer(motor, motor)
     out = {name: np.zeros(COORDINATES) for name in ("deflection", "tip", "strain", "gravity", "mode")}
+    out["first_moment"] = np.asarray(0.0)
     tension = np.zeros((COORDINATES, COORDINATES))
     if linked:
         area = p["width"] * p["thickness"]
@@ -82,6 +84,7 @@ def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
         out["strain"][:size] = p["thickness"] / 2 * beam.root_curvature @ elastic
         out["gravity"][:size] = beam.first_moment * root + beam.weight @ elastic
         out["mode"][len(names) : size] = 1.0
+        out["first_moment"] = np.asarray(beam.first_moment)
         tension[:size, :size] = elastic.T @ beam.foreshortening @ elastic
     for inertia, arm, compliance in (
         (p["base_inertia"], base, springs["base"]),
