@@ -1,7 +1,8 @@
 """What can be hidden: each effect in its own physical form, written into a rig at a given size.
 
 An effect is a function of the rig, the size and random numbers for its secondary choices. It
-changes the rig and returns where it acts and the values that define it. Size zero is absence.
+changes the rig and returns where it acts and the values that define it, by the names that the
+library's own effects use. Size zero is absence.
 """
 
 from collections.abc import Callable
@@ -58,7 +59,7 @@ def stribeck_friction(rig, size, draw):
     """A Coulomb level with more near rest: `torque` is the excess."""
     excess, rate = size * draw.uniform(0.6, 1.2), draw.uniform(0.1, 0.4)
     rig.forces |= {"dry": rig.forces["dry"] + size, "stribeck": excess, "stribeck_rate": rate}
-    return "joint_1", {"torque": excess, "stribeck_rate": rate, "coulomb_torque": size}
+    return "joint_1", {"torque": excess, "level": size, "stribeck_rate": rate}
 
 
 @effect("asymmetric_friction", 0.005, 0.2)
@@ -66,7 +67,7 @@ def asymmetric_friction(rig, size, draw):
     """Dry friction that differs with direction: `torque` is half the difference."""
     share = draw.uniform(0.4, 0.8) * draw.choice([-1, 1])
     rig.forces |= {"dry": rig.forces["dry"] + size, "asymmetry": share}
-    return "joint_1", {"torque": size * share, "coulomb_torque": size}
+    return "joint_1", {"torque": size * share, "level": size}
 
 
 @effect("quadratic_drag", 5e-4, 0.05)
@@ -100,7 +101,7 @@ def load_torque_bias(rig, size, draw):
 def joint_flexibility(rig, size, draw):
     """A spring between rotor and hub; the encoder sits on the rotor."""
     rig.body["joint_compliance"] = size
-    return "joint_1", {"compliance": size, "stiffness": 1 / size if size else np.inf}
+    return "joint_1", {"compliance": size}
 
 
 @effect("backlash", 1e-3, 0.1)
@@ -136,10 +137,11 @@ def input_delay(rig, size, draw):
 @effect("torque_constant", 0.1, 2.0)
 def torque_constant(rig, size, draw):
     """Wrong by the factor 1 + size or its inverse; half the time the back-EMF constant goes with it."""
-    factor, follows = (1 + size) ** draw.choice([-1, 1]), bool(draw.integers(2))
-    rig.body["torque_constant"] *= factor
-    rig.body["back_emf_constant"] *= factor if follows else 1.0
-    return "joint_1", {"torque_constant": rig.body["torque_constant"], "back_emf_follows": float(follows)}
+    share = float(draw.integers(2))
+    change = rig.body["torque_constant"] * ((1 + size) ** draw.choice([-1.0, 1.0]) - 1)
+    rig.body["torque_constant"] += change
+    rig.body["back_emf_constant"] += share * change
+    return "joint_1", {"change": change, "back_emf_share": share}
 
 
 @effect("winding_heating", 0.02, 2.0)
@@ -147,7 +149,7 @@ def winding_heating(rig, size, draw):
     """Resistance grows by `size` of itself a second at one ampere, and falls back slowly."""
     time = draw.uniform(6, 20)
     rig.forces |= {"warming": size, "cooling": 1 / time}
-    return "joint_1", {"rate": size, "time_constant": time}
+    return "joint_1", {"coefficient": size / rig.body["resistance"], "cooling_time": time}
 
 
 # ---- body
@@ -156,20 +158,20 @@ def winding_heating(rig, size, draw):
 @effect("payload_mass", 0.01, 0.3, link=True)
 def payload_mass(rig, size, draw):
     rig.body["payload_mass"] += size
-    return "tip", {"mass": rig.body["payload_mass"], "added": size}
+    return "tip", {"mass": size}
 
 
 @effect("hub_inertia", 2e-4, 0.05)
 def hub_inertia(rig, size, draw):
     rig.body["hub_inertia"] += size
-    return "joint_1", {"inertia": rig.body["hub_inertia"], "added": size}
+    return "joint_1", {"inertia": size}
 
 
 @effect("root_compliance", 0.01, 2.0, link=True)
 def root_compliance(rig, size, draw):
     """A spring between hub and link; the tip is seen from the hub."""
     rig.body["root_compliance"] = size
-    return "link_1", {"compliance": size, "stiffness": 1 / size if size else np.inf}
+    return "link_1", {"compliance": size}
 
 
 @effect("gravity", 0.2, 9.81, link=True)
@@ -177,7 +179,7 @@ def gravity(rig, size, draw):
     """A tilted base: the part of gravity in the plane, along -y or up to half a radian from it."""
     direction = draw.choice([0.0, draw.uniform(-0.5, 0.5)])
     rig.forces |= {"weight": size, "weight_direction": direction}
-    return "base", {"gravity": size, "direction": direction}
+    return "base", {"along_y": size * np.cos(direction), "along_x": size * np.sin(direction)}
 
 
 @effect("structural_damping", 0.01, 0.5, link=True)
@@ -185,20 +187,20 @@ def structural_damping(rig, size, draw):
     """More damping in the link: the same ratio in every mode, or rising with frequency (Kelvin-Voigt)."""
     rise = float(draw.integers(2))
     rig.body |= {"extra_damping": size, "rise": rise}
-    return "link_1", {"damping_ratio": rig.body["damping_ratio"] + size, "added": size, "rise": rise}
+    return "link_1", {"ratio": size, "rise": rise}
 
 
 @effect("centrifugal_stiffening", 1.0, 60.0, link=True)
 def centrifugal_stiffening(rig, size, draw):
     """Foreshortening; 1 is what the link itself has, more stands for an axial load that turns with it."""
     rig.body["foreshortening"] = size
-    return "link_1", {"factor": size}
+    return "link_1", {"share": size}
 
 
 @effect("viscous_friction", 5e-4, 0.2)
 def viscous_friction(rig, size, draw):
     rig.body["viscous_friction"] += size
-    return "joint_1", {"coefficient": rig.body["viscous_friction"], "added": size}
+    return "joint_1", {"coefficient": size}
 
 
 # ---- sensors
@@ -223,7 +225,7 @@ def sensor_gain(rig, size, draw):
     c, name = sensor(rig, draw, ("angle", "current", "tip_deflection", "strain"))
     factor = (1 + size) ** draw.choice([-1, 1])
     rig.faults["gain"][c] *= factor
-    return name, {"gain": factor}
+    return name, {"error": factor - 1}
 
 
 @effect("sensor_lag", 0.004, 0.3)
@@ -246,7 +248,9 @@ def sensor_drift(rig, size, draw):
 
 @effect("periodic_disturbance", 0.003, 0.3)
 def periodic_disturbance(rig, size, draw):
+    """A sine of torque on the hub, in the two runs with the same phase or with one of its own."""
     frequency, phase = draw.uniform(1.5, 12.0), draw.uniform(0, 2 * np.pi, RUNS)
+    phase = draw.choice([phase, phase[[0, 0]]])
     times = np.arange(SAMPLES)[:, None] * SAMPLE
     rig.disturbance = rig.disturbance + size * np.sin(2 * np.pi * frequency * times + phase)
-    return "joint_1", {"torque": size, "frequency": frequency}
+    return "joint_1", {"torque": size, "frequency": frequency, "phase_1": phase[0], "phase_2": phase[1]}
