@@ -35,8 +35,15 @@ class Beam:
     foreshortening: np.ndarray
 
 
-def clamped_beam(length, mass_per_length, rigidity, tip_mass, tip_inertia, modes):
-    """The `modes` lowest modes of a link of `length` [m], [kg/m], [N m^2] with a body at its tip."""
+def clamped_beam(
+    length, mass_per_length, rigidity, tip_mass, tip_inertia, modes, carried=0.0, root_compliance=0.0
+):
+    """The `modes` lowest modes of a link of `length` [m], [kg/m], [N m^2] with a body at its tip.
+
+    Where it has to carry more than that body, `carried` [kg] beyond its tip, the shapes are those
+    that suit the load: modes with all of the mass, and the bending under a moment at the tip. With
+    a `root_compliance` [rad/(N m)] the root may turn under the hub's axis, on a spring.
+    """
     h = length / ELEMENTS
     size = 2 * (ELEMENTS + 1)
     mass, stiff, tension = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
@@ -60,17 +67,27 @@ def clamped_beam(length, mass_per_length, rigidity, tip_mass, tip_inertia, modes
         mass[part, part] += inertia_element
         stiff[part, part] += bending_element
         x = (e + s) * h
-        axial = mass_per_length * (length**2 - x**2) / 2 + tip_mass * length
+        axial = mass_per_length * (length**2 - x**2) / 2 + (tip_mass + carried) * length
         tension[part, part] += (slopes * (axial * weights * h / 2)) @ slopes.T
     mass[-2, -2] += tip_mass
     mass[-1, -1] += tip_inertia
-    free = slice(2, size)
-    squares, shapes = scipy.linalg.eigh(
-        stiff[free, free], mass[free, free], subset_by_index=[0, max(modes, 1) - 1]
+    if root_compliance > 0:
+        stiff[1, 1] += 1 / root_compliance
+    free = slice(1 if root_compliance > 0 else 2, size)
+    stiff_free, mass_free = stiff[free, free], mass[free, free]
+    shapes = np.eye(len(stiff_free))
+    if carried > 0:
+        loaded = mass_free.copy()
+        loaded[-2, -2] += carried
+        _, suited = scipy.linalg.eigh(stiff_free, loaded, subset_by_index=[0, modes - 2])
+        bent = np.linalg.solve(stiff_free, np.eye(len(stiff_free))[:, -1:])
+        shapes = np.concatenate([suited, bent / np.abs(bent).max()], axis=1)
+    squares, mixing = scipy.linalg.eigh(
+        shapes.T @ stiff_free @ shapes, shapes.T @ mass_free @ shapes, subset_by_index=[0, max(modes, 1) - 1]
     )
-    squares, shapes = squares[:modes], shapes[:, :modes]
+    squares, shapes = squares[:modes], (shapes @ mixing)[:, :modes]
     shapes = shapes * np.sign(shapes[-2])
-    full = np.vstack([np.zeros((2, modes)), shapes])
+    full = np.vstack([np.zeros((size - len(shapes), modes)), shapes])
     turning = np.zeros(size)
     turning[0::2], turning[1::2] = np.arange(ELEMENTS + 1) * h, 1.0
     sideways = np.zeros(size)

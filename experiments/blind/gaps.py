@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.optimize
 
-from .drive import SEGMENT, SEGMENTS, record, replay
-from .rigs import NOISE, RUNS, Rig
-from .simulator import CHANNELS, SAMPLE
-from .structure import STATES, readings, structure
+from .drive import record, replay, segments, starts
+from .rigs import NOISE, Rig
+from .sensitivities import sensitivities
+from .simulator import CHANNELS
 
 REACH = 3.0
 PASSES = 3  # of Gauss-Newton
@@ -46,47 +45,51 @@ class Gap:
 
 
 def measure(plain: Sequence[Rig], rigs: Sequence[Rig], substeps: int):
-    """The gap of every rig against its `plain` self; also voltage and clean readings of both runs."""
+    """The gap of every rig against its `plain` self; also voltages and clean readings of both runs."""
     voltage, read, states = record(rigs, substeps)
-    count = len(rigs)
-    cut = read.reshape(SEGMENTS, SEGMENT, len(CHANNELS), count, RUNS).transpose(1, 2, 3, 4, 0)
-    volts = voltage.reshape(SEGMENTS, SEGMENT, count, RUNS).transpose(2, 1, 3, 0)
+    start = starts(plain, rigs, states)
+    volts, cut = segments(voltage), segments(read)
     raw: list[np.ndarray] = []
     left: list[np.ndarray] = []
     change = [np.zeros(len(rig.nominal.uncertainty)) for rig in plain]
     for _ in range(PASSES):
         left = []
         fitted = [moved(rig, d) for rig, d in zip(plain, change, strict=True)]
-        expected, starts = replay(fitted, rigs, voltage, states)
+        expected = replay(fitted, volts, start)
         for n, rig in enumerate(fitted):
-            pick, floor = logged(rig)
-            residual = (cut[:, pick, n] - expected[:, pick, n]) / floor[:, None, None]
-            residual = residual.reshape(SEGMENT, len(pick), RUNS * SEGMENTS)
-            raw += [residual] if len(raw) < count else []
-            start = starts[:, n].reshape(len(starts), -1)
-            rest, change[n] = project(rig, residual, volts[n].reshape(SEGMENT, -1), start, change[n])
+            residual = (cut[:, :, :, n] - expected[:, :, :, n]) / floor(rig)[..., None]
+            residual = residual[:, logged(rig)]
+            raw += [residual] if len(raw) < len(rigs) else []
+            rest, change[n] = project(rig, residual, volts[:, :, n], start[:, n], change[n])
             left.append(rest)
     gaps = []
     for n, rig in enumerate(plain):
-        sizes = (dict(zip(rig.nominal.channels, rms(r).tolist(), strict=True)) for r in (raw[n], left[n]))
-        gaps.append(Gap(*sizes))
+        names = [f"{CHANNELS[c]}_{j + 1}" for c, j in np.argwhere(logged(rig))]
+        gaps.append(Gap(*(dict(zip(names, rms(r).tolist(), strict=True)) for r in (raw[n], left[n]))))
     return gaps, voltage, read
 
 
 def moved(rig: Rig, change: np.ndarray) -> Rig:
     """The rig with its nominal parameters multiplied by `exp(change)`."""
-    names = rig.nominal.uncertainty
-    body = {n: rig.body[n] * float(np.exp(d)) for n, d in zip(names, change, strict=True)}
-    return dataclasses.replace(rig, body=rig.body | body)
+    body = {k: v.copy() for k, v in rig.body.items()}
+    for (name, j), d in zip(rig.nominal.uncertainty, change, strict=True):
+        body[name][j] *= np.exp(d)
+    return dataclasses.replace(rig, body=body)
 
 
-def logged(rig: Rig) -> tuple[list[int], np.ndarray]:
-    """Indices and noise floors of the channels in the recording."""
-    channels = rig.nominal.channels
-    return [CHANNELS.index(c) for c in channels], np.array([NOISE[c] for c in channels])
+def logged(rig: Rig) -> np.ndarray:
+    """Which channels [channels, joints] are in the recording."""
+    return np.isfinite(floor(rig))
+
+
+def floor(rig: Rig) -> np.ndarray:
+    """Noise floor [channels, joints]; infinite where a channel is not logged."""
+    one = [NOISE[c] if c in rig.nominal.channels else np.inf for c in CHANNELS]
+    return np.repeat(np.array(one)[:, None], rig.nominal.joints, axis=1)
 
 
 def rms(residual: np.ndarray) -> np.ndarray:
+    """Over samples and segments."""
     size = np.sqrt(np.mean(residual**2, axis=(0, 2)))
     return np.where(np.isfinite(size), size, np.inf)
 
@@ -94,42 +97,27 @@ def rms(residual: np.ndarray) -> np.ndarray:
 def project(rig: Rig, residual: np.ndarray, voltage: np.ndarray, start: np.ndarray, change: np.ndarray):
     """One Gauss-Newton step of the fit of initial states and parameters.
 
-    `residual` [samples, channels, segments] was found under `voltage` [samples, segments]
+    `residual` [samples, channels, segments] was found under `voltage` [samples, joints, segments]
     from `start` [states, segments], with the parameters already moved by `change` [log].
     Returns what the fit leaves of it, and the new change.
     """
     if not np.isfinite(residual).all():
         return np.full_like(residual, np.inf), change
-    names = list(rig.nominal.uncertainty)
-    probes = [moved(rig, PROBE * unit) for unit in np.eye(len(names))]
-    structures = [structure(r.body) for r in (rig, *probes)]
-    used = np.flatnonzero(np.abs(structures[0]["system"]).sum(axis=1) > 0)
-    pick, floor = logged(rig)
-    rows = np.stack([readings(s)[pick][:, used] for s in structures]) / floor[:, None]
-    flow = np.stack([transition(s["system"]) for s in structures])
-    step, push = flow[:, used][:, :, used], flow[:, used, STATES:]
+    prior = np.array(list(rig.nominal.uncertainty.values()))
+    probes = [moved(rig, PROBE * unit) for unit in np.eye(len(prior))]
+    released, motion = sensitivities([rig, *probes], voltage, start, floor(rig))
+    basis, _ = np.linalg.qr(released)
 
-    free = np.eye(len(used))
-    state = np.repeat(start[None, used], len(structures), axis=0)
-    released, answers = [], []
-    for volts in voltage:
-        released.append(rows[0] @ free)
-        answers.append(rows @ state)
-        free = step[0] @ free
-        state = step @ state + push * volts
-    size = residual.shape[0] * residual.shape[1]
-    basis, _ = np.linalg.qr(np.stack(released).reshape(size, -1))
-    moves = np.stack(answers)  # samples, structures, channels, segments
-    slopes = (moves[:, 1:] - moves[:, :1]) / PROBE
-    columns = slopes.transpose(0, 2, 1, 3).reshape(size, -1)
-    columns = (columns - basis @ (basis.T @ columns)).reshape(size, len(names), -1)
-    target = residual.reshape(size, -1)
-    target = target - basis @ (basis.T @ target)
-    prior = np.array([rig.nominal.uncertainty[n] for n in names])
-    columns = columns.transpose(0, 2, 1).reshape(-1, len(names))
+    def remainder(columns):
+        return columns - basis @ (basis.swapaxes(1, 2) @ columns)
+
+    slopes = np.moveaxis((motion[1:] - motion[0]) / PROBE, 0, -1)  # segments, size, parameters
+    target = remainder(np.moveaxis(residual, -1, 0).reshape(*slopes.shape[:2], 1))
+    columns = remainder(slopes).reshape(-1, len(prior))
     unmoved = target.reshape(-1) + columns @ change
     change = prior * bounded_fit(columns * prior, unmoved)
-    return (unmoved - columns @ change).reshape(residual.shape), change
+    rest = (unmoved - columns @ change).reshape(residual.shape[-1], *residual.shape[:2])
+    return np.moveaxis(rest, 0, -1), change
 
 
 def bounded_fit(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -141,10 +129,3 @@ def bounded_fit(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
         excess = lambda m: np.linalg.norm(along / (values + np.exp(m))) - REACH  # noqa: E731
         answer = along / (values + np.exp(scipy.optimize.brentq(excess, 0.0, 80.0)))
     return vectors @ answer
-
-
-def transition(system: np.ndarray) -> np.ndarray:
-    """[state, voltage] -> state a sample later, the voltage held."""
-    block = np.zeros((STATES + 1, STATES + 1))
-    block[:STATES] = system
-    return scipy.linalg.expm(block * SAMPLE)[:STATES]

@@ -1,7 +1,6 @@
 """Make recordings with a hidden effect: `python -m experiments.blind.make -o DIR`."""
 
 import argparse
-import copy
 import itertools
 import json
 from dataclasses import dataclass
@@ -67,7 +66,7 @@ def make_cases(
     size_of = dict(zip(singles, sizes, strict=True))
     rigs, truths = [], []
     for names, gap, seed in jobs:
-        rig, truth = copy.deepcopy(plain[names, seed]), []
+        rig, truth = plain[names, seed].copy(), []
         for name in names:
             size = size_of[(names, seed), name, gap]
             location, values = hide(rig, (names, seed), name, size)
@@ -85,7 +84,7 @@ def make_cases(
         }  # fmt: skip
         draw = generator(plant, names, gap, seed, noise)
         runs = [
-            columns(rigs[n], voltage[:, n, r], read[:, :, n, r], generator_noise(draw, noise))
+            columns(rigs[n], voltage[:, :, n, r], read[..., n, r], generator_noise(draw, noise))
             for r in range(RUNS)
         ]
         name = f"{title}-{gap:g}-{seed}" if names else f"{title}-{seed}"
@@ -97,7 +96,7 @@ def with_peaks(rigs: list[Rig]) -> list[Rig]:
     """The rigs, knowing how far they go with nothing hidden."""
     voltage, read, _ = record(rigs, COARSE)
     for n, rig in enumerate(rigs):
-        rig.peak = {"voltage": float(np.abs(voltage[:, n]).max()), "angle": float(read[:, 0, n].max())}
+        rig.peak = {"voltage": np.abs(voltage[:, :, n]).max(axis=(0, 2)), "angle": read[:, 0, 0, n].max()}
     return rigs
 
 
@@ -118,14 +117,15 @@ def generator_noise(draw: np.random.Generator, kind: str):
 
 def columns(rig: Rig, voltage: np.ndarray, read: np.ndarray, noise) -> dict[str, np.ndarray]:
     """One run as it is logged: the encoder counts, everything else has noise."""
-    out = {"time [s]": np.arange(SAMPLES) * SAMPLE, "voltage_1 [V]": voltage}
-    for channel in CHANNELS:
-        if channel in rig.nominal.channels:
-            signal = read[:, CHANNELS.index(channel)]
-            logged = (
-                np.round(signal / COUNT) * COUNT if channel == "angle" else signal + noise(NOISE[channel])
-            )
-            out[f"{channel}_1 [{UNITS[channel]}]"] = logged
+    joints = range(rig.nominal.joints)
+    out = {"time [s]": np.arange(SAMPLES) * SAMPLE}
+    out |= {f"voltage_{j + 1} [V]": voltage[:, j] for j in joints}
+    for channel in rig.nominal.channels:
+        for j in joints:
+            signal = read[:, CHANNELS.index(channel), j]
+            counted = np.round(signal / COUNT) * COUNT
+            value = counted if channel == "angle" else signal + noise(NOISE[channel])
+            out[f"{channel}_{j + 1} [{UNITS[channel]}]"] = value
     return out
 
 

@@ -1,11 +1,10 @@
 """The size of an effect that shows in the data as much as asked for."""
 
-import copy
 from collections.abc import Sequence
 
 import numpy as np
 
-from .effects import available
+from .effects import EFFECTS
 from .gaps import measure
 from .rigs import Rig, generator
 
@@ -43,7 +42,8 @@ class Search:
 
 def hide(rig: Rig, key: object, name: str, size: float):
     """Write the effect into the rig; its secondary choices depend on the key alone."""
-    return available("any")[name].hide(rig, size, generator("effect", key, name))
+    draw, joints = generator("effect", key, name), rig.nominal.joints
+    return EFFECTS[name].hide(rig, size, int(draw.integers(joints)) if joints > 1 else 0, draw)
 
 
 def find_sizes(tasks: Sequence[tuple[Rig, object, str, float]]) -> list[float]:
@@ -51,16 +51,15 @@ def find_sizes(tasks: Sequence[tuple[Rig, object, str, float]]) -> list[float]:
 
     Where no size up to the largest believable one does, that one.
     """
-    known = available("any")
     searches = [
-        Search(np.log(known[name].guess * gap / 3), np.log(known[name].most)) for *_, name, gap in tasks
+        Search(np.log(EFFECTS[name].guess * gap / 3), np.log(EFFECTS[name].most)) for *_, name, gap in tasks
     ]
     left = list(range(len(tasks)))
     for _ in range(ROUNDS):
         rigs = []
         for t in left:
             rig, key, name, _ = tasks[t]
-            rigs.append(copy.deepcopy(rig))
+            rigs.append(rig.copy())
             hide(rigs[-1], key, name, float(np.exp(searches[t].at)))
         if rigs:
             measured, _, _ = measure([tasks[t][0] for t in left], rigs, COARSE)

@@ -9,7 +9,6 @@ connections, the matrices are padded to the same size, so that all plants run in
 from collections.abc import Mapping
 
 import numpy as np
-import scipy.linalg
 
 from .beam import clamped_beam
 
@@ -20,8 +19,8 @@ SPRING_DAMPING = 0.02  # damping ratio of the connections, where they have a spr
 LINK_MODES = 4
 
 
-def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
-    """Matrices of the plant with physical parameters `p` (SI).
+def structure(body: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Matrices of the plant with physical parameters `body` (SI; of its one joint).
 
     Returns
 
@@ -32,6 +31,7 @@ def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     - `first_moment` [kg m] of the straight link; `mobility`, the inverse mass matrix;
       `tension`, the stiffness that turning at 1 rad/s adds by foreshortening
     """
+    p = {k: float(v[0]) for k, v in body.items()}
     loose = p["backlash"] > 0
     springs = {
         "base": p["base_compliance"],
@@ -109,28 +109,3 @@ def structure(p: Mapping[str, float]) -> dict[str, np.ndarray]:
     padded = np.zeros((COORDINATES, COORDINATES))
     padded[:size, :size] = mobility
     return out | {"system": system, "mobility": padded, "tension": tension}
-
-
-def exact_step(s: Mapping[str, np.ndarray], forced: tuple[str, ...], foreshortening: float, step: float):
-    """[state, voltage, forces, coordinates x rate squared] -> state after `step` [s].
-
-    The voltage is held and the linear part exact (matrix exponential); a force along one of
-    the rows `forced` is a kick at the beginning. The last columns are what a turning link
-    feels: its modes are thrown outwards, and stiffened where `foreshortening` is one.
-    """
-    block = np.zeros((STATES + 1, STATES + 1))
-    block[:STATES] = s["system"]
-    flow = scipy.linalg.expm(block * step)[:STATES]
-    outward = np.diag(s["mode"]) - foreshortening * s["tension"]
-    along = np.stack([s[name] for name in forced], axis=1)
-    kicks = step * s["mobility"] @ np.concatenate([along, outward], axis=1)
-    return np.concatenate([flow, flow[:, 1 + COORDINATES : STATES] @ kicks], axis=1)
-
-
-def readings(s: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Rows [channel, STATES] of angle, current, tip deflection, rate and strain."""
-    rows = np.zeros((5, STATES))
-    x, v = slice(1, 1 + COORDINATES), slice(1 + COORDINATES, STATES)
-    rows[0, x], rows[1, 0], rows[2, x] = s["motor"], 1.0, s["deflection"]
-    rows[3, v], rows[4, x] = s["motor"], s["strain"]
-    return rows
