@@ -49,10 +49,12 @@ def make_cases(
     gaps: list[float],
     seeds: list[int],
     noise: str = "white",
+    also: tuple[str, ...] = (),
 ) -> list[Case]:
     """Cases for every combination; `()` among the effects is nothing hidden, once a seed.
 
-    In a case with several effects each has, alone, the gap asked for.
+    In a case with several effects each has, alone, the gap asked for. `noise` is `"white"` or
+    `"coloured"`; `also`: channels to log beside the usual, `"rate"` and `"strain"`.
     """
     known = available(plant)
     for name in itertools.chain.from_iterable(effects):
@@ -60,7 +62,7 @@ def make_cases(
             raise ValueError(f"{name!r} cannot be hidden in {plant!r}; there are {', '.join(known)}.")
     jobs = [(e, g, s) for e in effects for g in (gaps if e else [0.0]) for s in seeds]
     keys = list(dict.fromkeys((e, s) for e, _, s in jobs))
-    plain = dict(zip(keys, with_peaks([true_rig(plant, key) for key in keys]), strict=True))
+    plain = dict(zip(keys, with_peaks([true_rig(plant, key, also) for key in keys]), strict=True))
     singles = list(dict.fromkeys(((e, s), name, g) for e, g, s in jobs for name in e))
     sizes = find_sizes([(plain[key], key, name, g) for key, name, g in singles])
     size_of = dict(zip(singles, sizes, strict=True))
@@ -168,10 +170,16 @@ def main() -> None:
     parser.add_argument("--gaps", default="1,3,10", help="projected gap over the noise floor")
     parser.add_argument("--seeds", type=int, default=3, help="how many, from 0")
     parser.add_argument("--noise", default="white", choices=["white", "coloured"])
+    parser.add_argument("--also", default="", help="channels to log beside the usual: rate,strain")
     given = parser.parse_args()
     gaps = [float(g) for g in given.gaps.split(",")]
     cases = make_cases(
-        given.plant, chosen(given.plant, given.effects), gaps, list(range(given.seeds)), given.noise
+        given.plant,
+        chosen(given.plant, given.effects),
+        gaps,
+        list(range(given.seeds)),
+        given.noise,
+        tuple(filter(None, given.also.split(","))),
     )
     for case in cases:
         write_case(case, given.o / case.name)

@@ -156,9 +156,10 @@ def generator(*key: object) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(repr(key).encode()))
 
 
-def true_rig(plant: str, key: object) -> Rig:
+def true_rig(plant: str, key: object, also: tuple[str, ...] = ()) -> Rig:
     """A rig of `plant` with nothing hidden: nominal parameters off by ERROR, its own references."""
     nominal, draw = NOMINAL[plant], generator(plant, key)
+    nominal = dataclasses.replace(nominal, channels=(*nominal.channels, *also))
     n = nominal.joints
     body = {
         k: np.array(v) * np.exp(ERROR.get(k, ERROR["default"]) * draw.standard_normal(len(v)))
