@@ -197,7 +197,7 @@ def structural_damping(rig, size, j, draw):
     return f"link_{j + 1}", {"ratio": size, "rise": rise}
 
 
-@effect("centrifugal_stiffening", 1.0, 60.0, LINKED)
+@effect("centrifugal_stiffening", 1.0, 20.0, LINKED)
 def centrifugal_stiffening(rig, size, j, draw):
     """Foreshortening; 1 is what the link itself has, more stands for an axial load that turns with it."""
     rig.body["foreshortening"][j] = size

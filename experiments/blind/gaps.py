@@ -41,7 +41,7 @@ class Gap:
     def survival(self) -> float:
         """Share of the gap that calibration cannot absorb, over all channels."""
         raw, left = (np.linalg.norm(list(g.values())) for g in (self.raw, self.projected))
-        return float(left / raw) if raw > 0 else 0.0
+        return float(left / raw) if 0 < raw < np.inf else 0.0
 
 
 def measure(plain: Sequence[Rig], rigs: Sequence[Rig], substeps: int):
@@ -90,7 +90,8 @@ def floor(rig: Rig) -> np.ndarray:
 
 def rms(residual: np.ndarray) -> np.ndarray:
     """Over samples and segments."""
-    size = np.sqrt(np.mean(residual**2, axis=(0, 2)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.sqrt(np.mean(residual**2, axis=(0, 2)))
     return np.where(np.isfinite(size), size, np.inf)
 
 

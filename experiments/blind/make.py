@@ -3,6 +3,7 @@
 import argparse
 import itertools
 import json
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,7 +54,8 @@ def make_cases(
 ) -> list[Case]:
     """Cases for every combination; `()` among the effects is nothing hidden, once a seed.
 
-    In a case with several effects each has, alone, the gap asked for. `noise` is `"white"` or
+    In a case with several effects each has, alone, the gap asked for. A case whose control loop
+    is unstable is left out, with a warning. `noise` is `"white"` or
     `"coloured"`; `also`: channels to log beside the usual, `"rate"` and `"strain"`.
     """
     known = available(plant)
@@ -79,6 +81,11 @@ def make_cases(
     cases = []
     for n, (names, gap, seed) in enumerate(jobs):
         figures = measured[n]
+        if not np.isfinite(figures.size):
+            warnings.warn(
+                f"{names}, gap {gap:g}, seed {seed} is left out: its loop is unstable.", stacklevel=2
+            )
+            continue
         title = "+".join(names).replace(":", "_") or "nothing"
         found = {
             "wanted": gap, "raw": figures.raw, "projected": figures.projected, "size": figures.size,
