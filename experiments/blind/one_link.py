@@ -1,0 +1,163 @@
+"""One driven joint with a link, a payload, or an inertia alone: exact linear steps, and kicks.
+
+Between kicks the linear part (`structure`) moves exactly as its matrix exponential says; every
+50 us all else (friction, contact, centrifugal and other forces) changes the rates by force times
+step. Conservative forces keep their energy so, but for the size of the step.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg
+
+from .joint import contact, friction, winding
+from .simulator import SAMPLE, dot, settled
+from .structure import COORDINATES, STATES, structure
+
+FORCED = ("motor", "hub", "frame", "tip", "deflection", "gravity")
+ROWS = (*FORCED, "strain", "mode")
+REPLAY = 10  # steps a sample that suffice where no friction acts
+
+
+def prepare(body: Mapping[str, np.ndarray], step: float) -> dict[str, np.ndarray]:
+    """Arrays that `advance` needs for a body."""
+    s = structure(body)
+    arrays = {k: s[k] for k in (*ROWS, "first_moment")}
+    return arrays | {"step": exact_step(s, body["foreshortening"][0], step)}
+
+
+def exact_step(s: Mapping[str, np.ndarray], foreshortening: float, step: float):
+    """[state, voltage, forces, coordinates x rate squared] -> state after `step` [s].
+
+    The voltage is held and the linear part exact (matrix exponential); a force along one of
+    the rows FORCED is a kick at the beginning. The last columns are what a turning link
+    feels: its modes are thrown outwards, and stiffened where `foreshortening` is one.
+    """
+    block = np.zeros((STATES + 1, STATES + 1))
+    block[:STATES] = s["system"]
+    flow = scipy.linalg.expm(block * step)[:STATES]
+    outward = np.diag(s["mode"]) - foreshortening * s["tension"]
+    along = np.stack([s[name] for name in FORCED], axis=1)
+    kicks = step * s["mobility"] @ np.concatenate([along, outward], axis=1)
+    return np.concatenate([flow, flow[:, 1 + COORDINATES : STATES] @ kicks], axis=1)
+
+
+def split(state):
+    """Current, coordinates and rates."""
+    return state[0], state[1 : 1 + COORDINATES], state[1 + COORDINATES :]
+
+
+def begin(plant, start):
+    """Memory: state, bristle [1], momentum of the bent link [N m s], resistance added by heat [ohm]."""
+    state = tuple(start[k] for k in range(STATES))
+    _, x, v = split(state)
+    nothing = jnp.zeros_like(start[0])
+    spin = dot(plant["arm"]["frame"], v)
+    held = spin * sum(m * q * q for m, q in zip(plant["arm"]["mode"], x, strict=True))
+    return state, nothing, held, nothing
+
+
+def state(memory):
+    """What `begin` takes."""
+    return memory[0]
+
+
+def channels(plant, memory):
+    """Angle, current, tip deflection, rate and strain of the joint, without any fault."""
+    p, (i, x, v) = plant["arm"], split(memory[0])
+    angle, rate = dot(p["motor"], x), dot(p["motor"], v)
+    return (angle,), (i,), (dot(p["deflection"], x),), (rate,), (dot(p["strain"], x),)
+
+
+def forces(plant, memory, time, disturbance, step):
+    """Forces along the rows FORCED, the square of the link's rate, the voltage lost, and new memory."""
+    p = {k: v[0] for k, v in plant["joint"].items()} | plant["arm"]
+    state, bristle, momentum, heat = memory
+    i, x, v = split(state)
+    motor, motor_rate = dot(p["motor"], x), dot(p["motor"], v)
+    hub, hub_rate = dot(p["hub"], x), dot(p["hub"], v)
+    angle, spin = dot(p["frame"], x), dot(p["frame"], v)
+
+    resisting, bristle = friction(p, motor, motor_rate, i, bristle, time, step)
+    weakening, loss, heat = winding(p, motor_rate, i, heat, step)
+    push = contact(p, motor - hub, motor_rate - hub_rate)
+    on_motor = resisting + weakening - push
+    on_hub = disturbance + push - p["cable"] * (hub - p["cable_rest"]) - p["load"]
+
+    # the bent link holds angular momentum, and gives it back; its weight hangs beside its axis
+    held = spin * sum(m * q * q for m, q in zip(p["mode"], x, strict=True))
+    heading = angle + p["gravity_direction"]
+    sideways = dot(p["gravity"], x) - p["first_moment"] * angle
+    on_frame = (momentum - held) / step + p["gravity_field"] * jnp.sin(heading) * sideways
+    weight = -p["gravity_field"] * jnp.cos(heading)
+    stop = -p["stop"] * jnp.maximum(dot(p["tip"], x) - p["stop_place"], 0.0)
+    harden = -p["hardening"] * dot(p["deflection"], x) ** 3
+    acting = (on_motor, on_hub, on_frame, stop, harden, weight)
+    return acting, spin * spin, loss, (bristle, held, heat)
+
+
+def advance(plant, memory, time, voltage, disturbance, step, flag):
+    """One step of `step` [s]."""
+    acting, whirl, loss, after = settled(
+        partial(forces, step=step), flag, plant, memory, time, disturbance[0]
+    )
+    s = memory[0]
+    moved = (*s, voltage[0] - loss, *acting, *(whirl * q for q in split(s)[1]))
+    new = tuple(sum(plant["arm"]["step"][k, j] * m for j, m in enumerate(moved)) for k in range(STATES))
+    return new, *after
+
+
+def readings(s: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Rows [channel, STATES] of angle, current, tip deflection, rate and strain."""
+    rows = np.zeros((5, STATES))
+    x, v = slice(1, 1 + COORDINATES), slice(1 + COORDINATES, STATES)
+    rows[0, x], rows[1, 0], rows[2, x] = s["motor"], 1.0, s["deflection"]
+    rows[3, v], rows[4, x] = s["motor"], s["strain"]
+    return rows
+
+
+def transition(system: np.ndarray) -> np.ndarray:
+    """[state, voltage] -> state a sample later, the voltage held."""
+    block = np.zeros((STATES + 1, STATES + 1))
+    block[:STATES] = system
+    return scipy.linalg.expm(block * SAMPLE)[:STATES]
+
+
+def translation(home: Mapping[str, np.ndarray], guest: Mapping[str, np.ndarray]) -> np.ndarray:
+    """State of the body `guest` -> state of `home`, which has rigid connections, by angle and modes."""
+    here, there = structure(home), structure(guest)
+    place = np.zeros((COORDINATES, COORDINATES))
+    place[0] = there["motor"]
+    for row, column in zip(np.flatnonzero(here["mode"]), np.flatnonzero(there["mode"]), strict=False):
+        place[row, column] = 1.0
+    out = np.zeros((STATES, STATES))
+    out[0, 0] = 1.0
+    x, v = slice(1, 1 + COORDINATES), slice(1 + COORDINATES, STATES)
+    out[x, x] = out[v, v] = place
+    return out
+
+
+def linear_sensitivities(bodies, voltage: np.ndarray, start: np.ndarray, scale: np.ndarray):
+    """Readings over the noise `scale` [channels, joints] of each of `bodies`, without the forces.
+
+    Returns, over [samples, channels x joints] flattened, the answer to every initial state of the
+    first body, the same in all segments, [1, size, states], and each body's own motion under
+    `voltage` [samples, joints, segments] from `start` [states, segments], [bodies, segments, size].
+    """
+    structures = [structure(b) for b in bodies]
+    used = np.flatnonzero(np.abs(structures[0]["system"]).sum(axis=1) > 0)
+    pick = np.flatnonzero(np.isfinite(scale[:, 0]))
+    rows = np.stack([readings(s)[pick][:, used] for s in structures]) / scale[pick]
+    flow = np.stack([transition(s["system"]) for s in structures])
+    step, push = flow[:, used][:, :, used], flow[:, used, STATES:]
+    free, state = np.eye(len(used)), np.repeat(start[None, used], len(structures), axis=0)
+    released, motions = [], []
+    for volts in voltage[:, 0]:
+        released.append(rows[0] @ free)
+        motions.append(rows @ state)
+        free, state = step[0] @ free, step @ state + push * volts
+    size = len(voltage) * len(pick)
+    motion = np.stack(motions).transpose(1, 3, 0, 2).reshape(len(structures), -1, size)
+    return np.stack(released).reshape(1, size, -1), motion
