@@ -1,1 +1,4 @@
-"""Where a model and its recordings disagree, and what is missing."""
+"""Diagnosis: where model and measurement disagree, what is missing, and the gap with it added."""
+
+from .diagnose import diagnose as diagnose
+from .result import Diagnosis as Diagnosis

@@ -1,0 +1,1 @@
+"""How often is the diagnosis right? Effects hidden in data of another making."""
