@@ -94,10 +94,9 @@ def fit(link: CoupledLink, hypothesis: str, table: Table) -> Boundary:
     `"clamped test"`, or `"all five"` frequencies together with the boundary.
     """
     theory = link.clamped(jnp.asarray(YOUNGS_MODULUS_OF_THEORY))[:3]
-    if hypothesis == "theory":
-        given = jnp.asarray(0.0)
-    else:  # frequencies go with the root of the modulus
-        given = 2 * jnp.mean(jnp.log(table.clamped / theory))
+    # frequencies go with the root of the modulus
+    clamped_says = 2 * jnp.mean(jnp.log(table.clamped / theory))
+    given = jnp.zeros(()) if hypothesis == "theory" else clamped_says
     free = hypothesis == "all five"
 
     def boundary(y):
