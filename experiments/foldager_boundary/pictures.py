@@ -71,8 +71,10 @@ def plane(link: CoupledLink, found: dict[str, dict]) -> Figure:
             axis.contourf(1e5 * inertias, stiffnesses, grid[..., mode], band, colors=[colour], alpha=0.6)
             axis.plot([], [], color=colour, linewidth=6, alpha=0.6, label=f"reads {value:g} Hz (± 0.5 Hz)")
         axis.axhspan(stiffnesses[0], 0.0, color="0.85", zorder=0)
-        axis.annotate("no spring has a stiffness below zero", (0.99, -0.02), xycoords=("axes fraction", "data"),
-                      xytext=(0, -10), textcoords="offset points", ha="right", fontsize=8, color="0.35")  # fmt: skip
+        axis.annotate(
+            "no spring has a stiffness below zero", (0.99, 0.02), xycoords="axes fraction",
+            ha="right", fontsize=8, color="0.35",
+        )  # fmt: skip
         axis.plot(
             1e5 * fitted["hub_inertia_kg_m2"], fitted["root_stiffness_N_m"], "o", color=MEASURED,
             label="best fit of a spring and hub",
