@@ -12,7 +12,7 @@ import jaxflex as jf
 from ..foldager import inferred_link
 
 GAUGE = 0.06  # m from the root: at the root itself a hinge leaves nothing to measure
-HELD = ctl.PD(stiffness=(5.0,), damping=(0.05,))  # V/rad, V s/rad
+STIFFNESS, DAMPING = 5.0, 0.05  # V/rad, V s/rad, of the PD
 CLAMP = 1e3  # kg m^2, a hub too heavy to move
 PIN = 1e-7  # kg m^2, a hub that weighs next to nothing: a lumped chain needs one
 MODELS = {
@@ -41,7 +41,7 @@ class Rig(eqx.Module):
 
     def __init__(self, model: str, support: str):
         made = arm(model, support)
-        controller = HELD if support == "driven" else None
+        controller = ctl.PD((STIFFNESS,), (DAMPING,)) if support == "driven" else None
         linear = jf.linearise(made, jnp.zeros(1), controller, ("strain_1",))
         assembled = made.assemble()
         size, link = assembled.size, assembled.links[0]

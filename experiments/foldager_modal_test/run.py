@@ -9,7 +9,7 @@ import jaxflex as jf
 from ..pictures import MEASURED, OURS, figure
 from .hammer import AFTER_BLOW, Record, strike
 from .identify import HIGH, LOW, Peak, frequency_response, peaks
-from .rig import GAUGE, HELD, MODELS, Rig
+from .rig import DAMPING, GAUGE, MODELS, STIFFNESS, Rig
 
 BLOWS = 5
 SUPPORTS = ("clamped", "pinned", "driven")
@@ -41,8 +41,8 @@ def run(folder: Path, reduced: bool) -> dict:
     return {
         "assumed": {
             "gauge_position_m": GAUGE,
-            "pd_stiffness_V_rad": float(HELD.stiffness[0]),
-            "pd_damping_V_s_rad": float(HELD.damping[0]),
+            "pd_stiffness_V_rad": STIFFNESS,
+            "pd_damping_V_s_rad": DAMPING,
             "modal_damping_ratio": float(theory.links[0].damping_ratio[0]),
         },
         "theory_hz": {
