@@ -32,12 +32,23 @@ def poles(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
     return np.linalg.eigvals(np.stack([loop(arm, k, d).A for k, d in zip(stiffness, damping, strict=True)]))
 
 
+def open_loop_poles(drive: str) -> np.ndarray:
+    """Poles [rad/s] of the coupled model, nothing commanded: a torque drive is a hub without a motor."""
+    return np.linalg.eigvals(np.asarray(jf.linearise(coupled(drive), jnp.zeros(1), channels=()).A))
+
+
+def vibrating(at: np.ndarray) -> tuple[float, float]:
+    """Frequency [Hz] and damping ratio of the least damped pole of `at` that is not real."""
+    at = at[at.imag > 0]
+    ratio = -at.real / np.abs(at)
+    least = np.argmin(ratio)
+    return float(np.abs(at[least]) / (2 * np.pi)), float(ratio[least])
+
+
 def elastic_mode(at: np.ndarray) -> tuple[float, float]:
     """Frequency [Hz] and damping ratio of the least damped pole in `BAND`."""
-    frequency, ratio = np.abs(at) / (2 * np.pi), -at.real / np.abs(at)
-    inside = np.flatnonzero((frequency > BAND[0]) & (frequency < BAND[1]) & (at.imag > 0))
-    least = inside[np.argmin(ratio[inside])]
-    return float(frequency[least]), float(ratio[least])
+    frequency = np.abs(at) / (2 * np.pi)
+    return vibrating(at[(frequency > BAND[0]) & (frequency < BAND[1])])
 
 
 def most_damped(dampings: np.ndarray, swept: np.ndarray) -> dict:

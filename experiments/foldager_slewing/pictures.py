@@ -60,12 +60,13 @@ def transfer(
     for name, gain in gains.items():
         size = 1e3 * np.abs(gain)
         left.semilogy(frequencies, size, color=colours[name], label=name)
-        if name == tuple(gains)[0]:  # it peaks where its neighbour does
+        if name == next(iter(gains)):  # it peaks where its neighbour does
             continue
         for top in tops(frequencies, size):
             left.annotate(
                 f"{frequencies[top]:.1f} Hz", (frequencies[top], size[top]), xytext=(0, 4), ha="center",
                 textcoords="offset points", fontsize=8, color=colours[name],
+                bbox=dict(facecolor="white", edgecolor="none", alpha=0.85, pad=0.3),
             )  # fmt: skip
     left.set_xlabel("frequency [Hz]")
     left.set_ylabel("tip deflection / voltage [mm/V]")
@@ -112,10 +113,8 @@ def locus(
         axis.set_title(title, fontsize=10)
         axis.set_xlabel("real part [1/s]")
         axis.set_ylabel("imaginary part / 2π [Hz]")
-    axes[0, 0].legend(fontsize=8, frameon=False, loc="upper left")
-    for axis, which, title in zip(
-        axes[1], (0, 1), ("coupled", "one-way (12) under the same PD"), strict=True
-    ):
+    axes[0, 0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.45))
+    for axis, which, title in zip(axes[1], (0, 1), ("coupled", "one-way"), strict=True):
         for (gain, tips), colour in zip(runs.items(), (THEIRS, OURS, MEASURED), strict=True):
             axis.plot(times, 1e3 * tips[which], color=colour, linewidth=1, label=f"{gain:.2g} V s/rad")
         axis.set_title(f"tip in a move of 0.5 rad in 0.25 s, {title}", fontsize=10)

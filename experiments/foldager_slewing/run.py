@@ -8,7 +8,18 @@ import numpy as np
 import jaxflex as jf
 
 from . import pictures, slew
-from .locus import STIFFNESS, TIMES, elastic_mode, left_ringing, most_damped, moves, poles
+from .locus import (
+    BAND,
+    STIFFNESS,
+    TIMES,
+    elastic_mode,
+    left_ringing,
+    most_damped,
+    moves,
+    open_loop_poles,
+    poles,
+    vibrating,
+)
 from .models import GAUGE, coupled, one_way, one_way_tip, rigid_axis, step_of_coupled, tip_over_voltage
 from .transfer import deflection_after_step
 
@@ -80,11 +91,17 @@ def control(folder: Path, points: int) -> dict:
         ),
         clamped, TIMES, runs,
     ).savefig(folder / "locus.png", dpi=130)  # fmt: skip
-    ends = {name: elastic_mode(by_damping[row]) for name, row in (("softest", 0), ("hardest", -1))}
+    shown = poles(np.full(3, STIFFNESS), np.array(list(runs)))
+    lowest = shown[-1][np.abs(shown[-1]) < 2 * np.pi * BAND[0]]
+    unpowered = {"no motor": "torque", "back-EMF alone": "voltage"}
     return {
         "stiffness_V_rad": STIFFNESS,
         "best": best,
-        "elastic_mode_hz_and_ratio": {name: list(mode) for name, mode in ends.items()},
+        "elastic_mode_hz_and_ratio": {
+            **{name: elastic_mode(open_loop_poles(drive)) for name, drive in unpowered.items()},
+            **{f"{gain:.3g}": elastic_mode(at) for gain, at in zip(runs, shown, strict=True)},
+        },
+        "lowest_mode_of_hard_hz_and_ratio": vibrating(lowest),
         "unstable_from_stiffness_V_rad": float(stiffnesses[np.argmax(by_stiffness.real.max(axis=1) > 0)]),
         "largest_real_part_against_damping": float(by_damping.real.max()),
         "ringing_left_mm": {

@@ -33,10 +33,12 @@ def slew(segments: int) -> Slew:
 
     profile = ctl.BangBang((CURRENT,), width=WIDTH, begin=BEGIN)
 
-    def run(arm):
-        return jf.simulate(arm, ctl.OpenLoop(), profile, times, method=TIGHT)
+    def run(arm, *channels):
+        return jf.simulate(arm, ctl.OpenLoop(), profile, times, method=TIGHT, channels=channels)
 
-    beam, chain, body = run(coupled("current")), run(lumped("current", segments)), run(rigid("current"))
+    beam = run(coupled("current"), "current_1", "angle_1", "rate_1", "tip_deflection_1", "strain_1")
+    chain = run(lumped("current", segments), "angle_1", "tip_deflection_1")
+    body = run(rigid("current"), "angle_1", "rate_1")
     t = np.asarray(times)
     gauge, encoder = jf.Sensor(noise=STRAIN_NOISE), jf.Sensor(resolution=2 * np.pi / ENCODER_COUNTS)
     strain = np.asarray(gauge.read(times, beam["strain_1"], jax.random.key(0)))
@@ -55,6 +57,7 @@ def slew(segments: int) -> Slew:
             "one-way": one_way_tip(t, np.asarray(body["rate_1"])),
             "one-way, measured hub": one_way_tip(t, np.asarray(beam["rate_1"])),
             "strain gauge": tip_from_strain(strain),
+            "strain gauge, no noise": tip_from_strain(np.asarray(beam["strain_1"])),
         },
     )
 
