@@ -37,8 +37,7 @@ def rigid(drive: str) -> jf.Arm:
 
 def one_way() -> jf.OneWayLink:
     """The paper's one-way link, on its clamped-free shapes."""
-    arm = coupled("current")
-    return jf.OneWayLink(arm.links[0].discretise(arm.distal(0), False))
+    return jf.OneWayLink(coupled("current").assemble().links[0])
 
 
 def rigid_axis(link_counted: bool) -> jf.MotorAxis:

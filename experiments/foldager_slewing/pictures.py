@@ -13,22 +13,22 @@ def slewing(found: Slew) -> Figure:
     t = found.times
     current.plot(t, found.current, color=OURS)
     current.set_ylabel("motor current [A]")
-    current.set_title("Fig. 8: current", fontsize=10)
+    current.set_title("a current like Fig. 8", fontsize=10)
     for name, colour in (("encoder", "0.6"), ("coupled", OURS), ("lumped", THEIRS), ("one-way", MEASURED)):
         angle.plot(t, found.angle[name], color=colour, label=name, linewidth=3 if name == "encoder" else 1)
     angle.set_ylabel("hub angle [rad]")
-    angle.set_title("Fig. 9: hub angle", fontsize=10)
+    angle.set_title("hub angle (Fig. 9)", fontsize=10)
     left.plot(t, 1e3 * found.tip["strain gauge"], color="0.6", label="from the strain gauge", linewidth=0.8)
     left.plot(t, 1e3 * found.tip["coupled"], color=OURS, label="coupled")
     left.plot(t, 1e3 * found.tip["lumped"], color=THEIRS, label="lumped", linewidth=0.9)
-    left.set_title("Fig. 10: tip deflection", fontsize=10)
+    left.set_title("tip deflection (Fig. 10)", fontsize=10)
     right.plot(t, 1e3 * found.tip["one-way"], color=MEASURED, label="one-way (12)", linewidth=0.9)
     right.plot(t, 1e3 * found.tip["coupled"], color=OURS, label="coupled")
     right.plot(
         t, 1e3 * found.tip["one-way, measured hub"], ":", color="k",
         label="one-way (11), hub as measured", linewidth=1,
     )  # fmt: skip
-    right.set_title("Fig. 10 again: the one-way model", fontsize=10)
+    right.set_title("tip deflection, the one-way model", fontsize=10)
     for axis in (left, right):
         axis.set_ylabel("tip deflection [mm]")
         axis.set_xlabel("time [s]")

@@ -15,7 +15,7 @@ CURRENT, WIDTH, BEGIN = 0.5, 0.2, 0.1  # A, s, s: forwards, and backwards for as
 AFTER = BEGIN + 2 * WIDTH  # s
 STEP, END = 5e-4, 1.5  # s
 STRAIN_NOISE, ENCODER_COUNTS = 0.5e-6, 4096  # strain, standard deviation; counts a turn
-TIGHT = jf.Adaptive(rtol=1e-8, atol=1e-10)
+TIGHT = jf.Adaptive(rtol=1e-8, atol=1e-10, stability=None)  # the link moves all the time
 
 
 class Slew(NamedTuple):
