@@ -32,11 +32,6 @@ def poles(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
     return np.linalg.eigvals(np.stack([loop(arm, k, d).A for k, d in zip(stiffness, damping, strict=True)]))
 
 
-def open_loop_poles(drive: str) -> np.ndarray:
-    """Poles [rad/s] of the coupled model, nothing commanded: a torque drive is a hub without a motor."""
-    return np.linalg.eigvals(np.asarray(jf.linearise(coupled(drive), jnp.zeros(1), channels=()).A))
-
-
 def vibrating(at: np.ndarray) -> tuple[float, float]:
     """Frequency [Hz] and damping ratio of the least damped pole of `at` that is not real."""
     at = at[at.imag > 0]

@@ -72,18 +72,19 @@ def tip_from_strain(strain: np.ndarray) -> np.ndarray:
     return strain * float(link.tip_deflection[0]) / (thickness / 2 * float(link.gauge_curvature[0]))
 
 
-def _open_loop() -> tuple[np.ndarray, ...]:
-    linear = jf.linearise(coupled("voltage"), jnp.zeros(1), channels=("tip_deflection_1",))
+def open_loop(drive: str = "voltage") -> tuple[np.ndarray, ...]:
+    """`A, B, C, D` of the coupled model from its command to its tip deflection [m]."""
+    linear = jf.linearise(coupled(drive), jnp.zeros(1), channels=("tip_deflection_1",))
     return tuple(np.asarray(matrix) for matrix in linear[:4])
 
 
 def tip_over_voltage(frequencies: np.ndarray) -> np.ndarray:
     """`w / V_a` [m/V] of the coupled model at `frequencies` [Hz]."""
-    a, b, c, _ = _open_loop()
+    a, b, c, _ = open_loop()
     one = np.eye(len(a))
     return np.array([(c @ np.linalg.solve(2j * np.pi * f * one - a, b))[0, 0] for f in frequencies])
 
 
 def step_of_coupled(times: np.ndarray) -> np.ndarray:
     """Tip deflection [m] of the coupled model after a step of 1 V."""
-    return scipy.signal.lsim(_open_loop(), np.ones_like(times), times)[1]
+    return scipy.signal.lsim(open_loop(), np.ones_like(times), times)[1]

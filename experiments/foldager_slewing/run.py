@@ -16,11 +16,19 @@ from .locus import (
     left_ringing,
     most_damped,
     moves,
-    open_loop_poles,
     poles,
     vibrating,
 )
-from .models import GAUGE, coupled, one_way, one_way_tip, rigid_axis, step_of_coupled, tip_over_voltage
+from .models import (
+    GAUGE,
+    coupled,
+    one_way,
+    one_way_tip,
+    open_loop,
+    rigid_axis,
+    step_of_coupled,
+    tip_over_voltage,
+)
 from .transfer import deflection_after_step
 
 PRINTED, COUNTED = "(12) as printed", "(12), link's inertia in J"
@@ -93,12 +101,15 @@ def control(folder: Path, points: int) -> dict:
     ).savefig(folder / "locus.png", dpi=130)  # fmt: skip
     shown = poles(np.full(3, STIFFNESS), np.array(list(runs)))
     lowest = shown[-1][np.abs(shown[-1]) < 2 * np.pi * BAND[0]]
-    unpowered = {"no motor": "torque", "back-EMF alone": "voltage"}
+    unpowered = {"no motor": "torque", "back-EMF alone": "voltage"}  # a torque drive's motor is ideal
     return {
         "stiffness_V_rad": STIFFNESS,
         "best": best,
         "elastic_mode_hz_and_ratio": {
-            **{name: elastic_mode(open_loop_poles(drive)) for name, drive in unpowered.items()},
+            **{
+                name: elastic_mode(np.linalg.eigvals(open_loop(drive)[0]))
+                for name, drive in unpowered.items()
+            },
             **{f"{gain:.3g}": elastic_mode(at) for gain, at in zip(runs, shown, strict=True)},
         },
         "lowest_mode_of_hard_hz_and_ratio": vibrating(lowest),
