@@ -7,6 +7,7 @@ Pure functions of pytrees, in SI units: everything works under `jit`, `vmap`, `g
 from .analysis.frequencies import clamped_frequencies as clamped_frequencies
 from .analysis.frequencies import driven_frequencies as driven_frequencies
 from .analysis.frequencies import locked_frequencies as locked_frequencies
+from .analysis.laplace import step_response as step_response
 from .analysis.linear import LinearModel as LinearModel
 from .analysis.linear import Modes as Modes
 from .analysis.linear import closed_loop_modes as closed_loop_modes

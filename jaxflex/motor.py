@@ -107,9 +107,23 @@ class MotorAxis(eqx.Module):
         `w(t) = w_inf (1 + (p2 exp(p1 t) - p1 exp(p2 t)) / (p1 - p2))` with p1, p2 the poles.
         Both poles must differ and the inductance must be present.
         """
-        a, b, c, _ = self.denominator()
-        root = jnp.sqrt((b * b - 4 * a * c).astype(complex))
-        p1, p2 = (-b + root) / (2 * a), (-b - root) / (2 * a)
-        final = self.motor.joint_torque(scalar(1.0)) * scalar(voltage) / c
+        final, p1, p2 = self._step(voltage)
         mix = (p2 * jnp.exp(p1 * t) - p1 * jnp.exp(p2 * t)) / (p1 - p2)
         return final * (1 + mix.real)
+
+    def angle_after_step(self, voltage: ScalarLike, t: Float[Array, "..."]) -> Float[Array, "..."]:
+        """Angle [rad] at `t` [s] after a step of `voltage` [V] from rest: the speed's integral.
+
+        `w_inf (t + (p2/p1 (exp(p1 t) - 1) - p1/p2 (exp(p2 t) - 1)) / (p1 - p2))`, under the
+        conditions of `speed_after_step`.
+        """
+        final, p1, p2 = self._step(voltage)
+        mix = (p2 / p1 * jnp.expm1(p1 * t) - p1 / p2 * jnp.expm1(p2 * t)) / (p1 - p2)
+        return final * (t + mix.real)
+
+    def _step(self, voltage: ScalarLike) -> tuple[Array, Array, Array]:
+        """Final speed [rad/s] under `voltage` [V], and the two poles [rad/s] of the speed."""
+        a, b, c, _ = self.denominator()
+        root = jnp.sqrt((b * b - 4 * a * c).astype(complex))
+        final = self.motor.joint_torque(scalar(1.0)) * scalar(voltage) / c
+        return final, (-b + root) / (2 * a), (-b - root) / (2 * a)

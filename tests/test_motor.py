@@ -21,6 +21,8 @@ def test_step_of_voltage_follows_the_closed_form():
     run = jf.simulate(arm(), OpenLoop(), Step((0.0,), (6.0,)), times, method=TIGHT)
     exact = AXIS.speed_after_step(6.0, times)
     np.testing.assert_allclose(run["rate_1"], exact, atol=1e-8 * float(exact[-1]))
+    angle = AXIS.angle_after_step(6.0, times)
+    np.testing.assert_allclose(run["angle_1"], angle, atol=1e-8 * float(angle[-1]))
     final = 0.062 * 6.0 / (1.2 * 2e-4 + 0.062**2)  # K_m V / (R b + K_m K_b)
     np.testing.assert_allclose(AXIS.speed_after_step(6.0, jnp.array(5.0)), final, rtol=1e-9)
 

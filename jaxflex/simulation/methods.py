@@ -75,7 +75,8 @@ class Adaptive(AbstractMethod):
         pid = diffrax.PIDController(
             rtol=self.rtol, atol=self.atol, pcoeff=0.2, icoeff=0.5, dtmin=SMALLEST_STEP, dtmax=longest
         )
-        clipped = diffrax.ClipStepSizeController(pid, jump_ts=jumps)
+        # diffrax looks into the jumps, so there must be some
+        clipped = diffrax.ClipStepSizeController(pid, jump_ts=jumps) if jumps.shape[0] else pid
         if period is None:
             return clipped
         return _ClipToSamples(inner=clipped, start=start, period=period)

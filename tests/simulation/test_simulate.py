@@ -133,6 +133,29 @@ def test_recorded_input_is_held():
     np.testing.assert_allclose(run["rate_1"][1:], 0.1 * np.cumsum(values[:-1, 0]), atol=1e-9)
 
 
+def test_reference_without_jumps():
+    class Still(jf.AbstractReference):
+        def __call__(self, t):
+            return (0.0 * t, 0.0 * t)
+
+        def jumps(self):
+            return jnp.zeros(0)
+
+        def end(self):
+            return jf.scalar(0.0)
+
+    start = jf.InitialState(rates=jnp.array([0.1, 0.0]))
+    for method in (TIGHT, jf.Fixed(1e-3)):
+        smooth, stepped = (
+            jf.simulate(
+                jf.ahmad_arm(modes=1, drive="torque"), OpenLoop(), signal, TIMES, initial=start, method=method,
+                channels=("angle_1",),
+            )["angle_1"]
+            for signal in (Still(), ZERO)
+        )  # fmt: skip
+        np.testing.assert_allclose(smooth, stepped, atol=1e-8)
+
+
 def test_payload_sweep_by_vmap_and_no_retrace():
     traces = []
 

@@ -1,0 +1,1 @@
+"""What holds the root of a link that a motor drives?"""

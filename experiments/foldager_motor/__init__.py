@@ -1,0 +1,1 @@
+"""The DC motor alone, against its transfer functions."""
