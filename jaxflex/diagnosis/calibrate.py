@@ -7,6 +7,8 @@ import numpy as np
 from .shooting import Linearised, Normal, Problem, Run
 
 CHORDS = 5  # steps with the same slopes; each needs only a run of the model
+MOST = 15  # iterations, however well they do
+SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
 
@@ -38,7 +40,7 @@ class Fit:
     @property
     def level(self) -> float:
         """Misfit a reading, in units of the noise: 1 is the noise floor."""
-        return (self.cost - self.prior) / self.count
+        return (self.cost - self.prior) / self.count if np.isfinite(self.cost) else np.inf
 
 
 def fit(
@@ -52,7 +54,8 @@ def fit(
 ) -> Fit:
     """Minimise misfit over `horizon` pieces plus prior; the starts of the pieces move along.
 
-    Ends when an iteration gains less than `tolerance` a reading, or is at its end.
+    Ends when an iteration gains less than `tolerance` a reading, or, after `iterations`
+    of them, less than a tenth of the cost.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -74,7 +77,7 @@ def fit(
 
     damping = 0.0
     kept = None
-    for _ in range(iterations):
+    for iteration in range(MOST):
         linears = [problem.linearise(run, vector, columns) for run in runs]
         first = condensed(linears)
         kept = keep(first.held + prior(vector), first)
@@ -112,7 +115,8 @@ def fit(
             damping = max(10 * damping, 1e-4)
             first = condensed(linears)
         restore(kept)
-        if before - kept[0] < tolerance * first.count:
+        gain = before - kept[0]
+        if gain < tolerance * first.count or (iteration + 1 >= iterations and gain < SLOW * before):
             break
     assert kept is not None
     return Fit(vector, freedom, kept[0], prior(vector), kept[1])

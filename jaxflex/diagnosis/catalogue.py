@@ -19,6 +19,7 @@ from ..files.arm_file import places
 from .parameters import Parameters
 
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
+WAVES = 1.5  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
 SATURATION = (0.4, 0.55, 0.7, 0.85)  # of the largest command
 COOLING = (0.0, 10.0)  # s
@@ -51,15 +52,16 @@ EITHER_SIGN = {
     "sensor_bias", "sensor_gain", "sensor_drift",
 }  # fmt: skip
 # and where they make sense only within bounds
-BOUNDS = {"centrifugal_stiffening": (0.3, 3.0)}
+BOUNDS = {"centrifugal_stiffening": (0.3, 3.0), "sensor_gain": (-0.5, 0.5)}
 
 
 def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
     """False for a friction that pushes, a spring that drives away, a lag into the future."""
     if not candidate.amplitudes:
         return 0.3 < step[0] < 3.0
-    low, high = BOUNDS.get(candidate.effect, (0.0, np.inf))
-    return candidate.effect in EITHER_SIGN or all(low <= value <= high for value in step)
+    anything = (-np.inf, np.inf) if candidate.effect in EITHER_SIGN else (0.0, np.inf)
+    low, high = BOUNDS.get(candidate.effect, anything)
+    return all(low <= value <= high for value in step)
 
 
 def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float]) -> list[AbstractEffect]:
@@ -108,6 +110,8 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
                 )
         elif name == "cogging_torque":
             for order in ORDERS:
+                if order * motion.range(effect.index) < WAVES * 2 * np.pi:
+                    continue  # too little of a wave to tell it from any other curve
                 yield Candidate(name, location, ("sine", "cosine"), (("order", float(order)),))
         elif name == "periodic_disturbance":
             for f in frequencies:
@@ -170,6 +174,10 @@ class Motion:
         motor = arm.joints[joint].motor
         emf = float(motor.back_emf_constant * motor.gear_ratio) * self.rate(joint)
         return (self.command[..., joint] - emf) / float(motor.resistance)
+
+    def range(self, joint: int) -> float:
+        """Range of the joint's angle [rad]."""
+        return float(np.ptp(self.angle(joint)))
 
     def rms_rate(self, joint: int) -> float:
         """Root mean square of the joint's rate [rad/s]."""

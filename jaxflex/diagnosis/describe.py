@@ -19,6 +19,7 @@ from .shooting import Problem, Run
 
 AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
 MOSTLY = 0.8  # share of the gap that named effects must explain where the floor is not reached
+OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]
 
 
@@ -74,7 +75,6 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
 
 def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[dict[str, float], list]:
     """Error of each channel over held-out runs, starts alone fitted; and the predictions."""
-    vector = hypothesis.fit.vector
     # the phase of a disturbance is its own in every run
     free = [
         problem.setting.parameters.position(*effect.key, name)
@@ -86,9 +86,11 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
     held = Freedom(tuple(free), np.zeros(count), np.zeros(count), np.full(count, -np.inf))
     squares, predictions = [], []
     for run in runs:
-        found = fit(problem, [run], vector, held, 1, 1)
-        found = fit(problem, [run], found.vector, held, HORIZON, 2)
-        reading = problem.predict(run, found.vector).reading
+        vector = hypothesis.fit.vector
+        for horizon in HORIZONS:
+            found = fit(problem, [run], vector, held, horizon, 4)
+            vector = found.vector
+        reading = problem.predict(run, vector).reading
         error = np.where(run.valid[..., None], run.reading - reading, 0.0)
         squares.append((error**2).sum((0, 1)) / run.valid.sum())
         predictions.append((run, reading))
@@ -105,7 +107,7 @@ def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothes
     search.restart(outcome.final_starts)
     free = freedom(search.parameters, final.effects)
     found = fit(prepared.problem, runs, final.fit.vector, free, HORIZON, 3)
-    return Hypothesis(final.effects, found, HORIZON)
+    return Hypothesis(final.effects, found, HORIZON, {HORIZON: found.cost})
 
 
 def _noise(problem: Problem) -> dict[str, float]:
@@ -137,7 +139,8 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
             estimates[column] = Estimate(size, size * part.spread * float(std), "SI")
         else:
             part = parameters.effect[column - len(parameters.nominal)]
-            estimates[column] = Estimate(float(value), float(std), _unit(part.unit, part.location))
+            whole = float(np.hypot(std, OWN_ERROR * value))
+            estimates[column] = Estimate(float(value), whole, _unit(part.unit, part.location))
     return estimates
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .describe import describe
-from .hypothesis import HORIZONS, Hypothesis, Outcome, Ranked, Search, allowance, without
+from .hypothesis import HORIZONS, Hypothesis, Outcome, Ranked, Search, without
 from .prepare import make_problem
 from .result import Diagnosis
 
@@ -48,7 +48,7 @@ def find(search: Search) -> Outcome:
     say = search.say
     settled = search.settle(search.parameters.start)
     settled_starts = search.starts()
-    base, base_starts = Hypothesis((), settled, 1), settled_starts
+    base, base_starts = Hypothesis((), settled, 1, {1: settled.cost}), settled_starts
     outcome: Outcome | None = None
     for _ in range(MOST_EFFECTS + 1):
         fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
@@ -61,7 +61,7 @@ def find(search: Search) -> Outcome:
         outcome.final, outcome.final_starts = fitted, starts
         horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
         ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
-        far = fitted.fit.level > CLOSE
+        far = fitted.fit.level > CLOSE and fitted.horizon == HORIZONS[0]
         if far:
             # a fit that the missing effect has bent is a poor place to judge from: the
             # parameters as they were before it are judged as well, over the shortest horizon
@@ -74,13 +74,12 @@ def find(search: Search) -> Outcome:
         before, before_starts = (base, base_starts) if far else (fitted, starts)
         confirmed = []
         for item in tried:
-            horizon = 1 if far else HORIZONS[-1]
+            horizon = fitted.horizon
             found = search.confirm(before, before_starts, item, horizon)
-            confirmed.append((found.fit.cost, found, search.starts()))
+            confirmed.append((found.strength(fitted), found, search.starts()))
             say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
-        _, best, best_starts = simplest(confirmed, settled.cost if far else fitted.fit.cost)
-        gain = _cost_at(fitted, best) - best.fit.cost
-        if gain < STRONG * allowance(best.fit.count, best.horizon) and not far:
+        strength, best, best_starts = simplest(confirmed)
+        if strength < STRONG:
             break
         base, base_starts = best, best_starts
     assert outcome is not None
@@ -90,15 +89,11 @@ def find(search: Search) -> Outcome:
     return outcome
 
 
-def simplest(confirmed: list[tuple], before: float) -> tuple:
+def simplest(confirmed: list[tuple[float, Hypothesis, list]]) -> tuple[float, Hypothesis, list]:
     """Of the hypotheses that explain practically the same, the one with the fewest parameters."""
-    least = min(cost for cost, _, _ in confirmed)
-    tied = [entry for entry in confirmed if entry[0] - least <= LEAD * max(before - least, 0.0)]
-    return min(tied, key=lambda entry: (len(entry[1].effects[-1].amplitudes), entry[0]))
-
-
-def _cost_at(fitted: Hypothesis, other: Hypothesis) -> float:
-    return fitted.fit.cost if fitted.horizon == other.horizon else np.inf
+    most = max(strength for strength, _, _ in confirmed)
+    tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
+    return min(tied, key=lambda entry: (len(entry[1].effects[-1].amplitudes), -entry[0]))
 
 
 def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:
@@ -121,22 +116,25 @@ def prune(search: Search, outcome: Outcome) -> None:
     gains: dict[tuple[str, str], float] = {}
     for effect in list(outcome.final.effects):
         if len(outcome.final.effects) == 1:
-            nominal = outcome.nominal
-            base = nominal.fit.cost if nominal.horizon == outcome.final.horizon else np.inf
-            gains[effect.key] = base - outcome.final.fit.cost
+            gains[effect.key] = _gain(outcome.nominal, outcome.final)
             continue
         search.restart(outcome.final_starts)
         rest = tuple(e for e in outcome.final.effects if e is not effect)
         vector = without(search.parameters, outcome.final.fit.vector, effect)
         found = search.climb(rest, vector, ceiling=CLOSE, iterations=3)
-        worth = np.inf if found.horizon < outcome.final.horizon else found.fit.cost - outcome.final.fit.cost
-        if worth < STRONG * allowance(found.fit.count, found.horizon):
+        if found.horizon == outcome.final.horizon and outcome.final.strength(found) < STRONG:
             search.say(f"{effect.effect} at {effect.location} is no longer needed")
             outcome.final, outcome.final_starts = found, search.starts()
         else:
-            gains[effect.key] = worth
+            gains[effect.key] = _gain(found, outcome.final)
     search.restart(outcome.final_starts)
     outcome.gains = [gains.get(effect.key, np.inf) for effect in outcome.final.effects]
+
+
+def _gain(before: Hypothesis, after: Hypothesis) -> float:
+    """Fall of the cost at the longest horizon that both were fitted over."""
+    horizon = max(before.costs.keys() & after.costs.keys())
+    return before.costs[horizon] - after.costs[horizon]
 
 
 def weigh(search: Search, outcome: Outcome) -> None:
@@ -148,15 +146,9 @@ def weigh(search: Search, outcome: Outcome) -> None:
         for item, share in found[:2]:
             search.restart(starts)
             vector = without(search.parameters, final.fit.vector, effect)
-            base = Hypothesis(rest, dataclasses.replace(final.fit, vector=vector), final.horizon)
+            base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
             rival = search.confirm(base, starts, item, final.horizon)
-            gain = outcome.gains[place]
-            loss = rival.fit.cost - final.fit.cost
-            worth = gain if np.isfinite(gain) else share
-            if (
-                rival.horizon == final.horizon
-                and loss < max(TIE * worth, 0.0)
-                and loss < allowance(final.fit.count, final.horizon)
-            ):
+            lost = _gain(rival, final)
+            if rival.horizon == final.horizon and lost < TIE * share and final.strength(rival) < 1.0:
                 outcome.rivals.append((place, rival))
     search.restart(starts)

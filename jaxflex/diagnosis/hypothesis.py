@@ -25,11 +25,19 @@ FREQUENCIES = 3  # of a periodic disturbance that are tried
 
 @dataclass
 class Hypothesis:
-    """Effects in the order added, and where their fit came to."""
+    """Effects in the order added, and where their fit came to; `costs` at each horizon on the way."""
 
     effects: tuple[Candidate, ...]
     fit: Fit
     horizon: int
+    costs: dict[int, float]
+
+    def strength(self, other: "Hypothesis") -> float:
+        """By how much it beats another, in units of what noise and the model's own error may bring."""
+        shared = self.costs.keys() & other.costs.keys()
+        return max(
+            ((other.costs[h] - self.costs[h]) / allowance(self.fit.count, h) for h in shared), default=-np.inf
+        )
 
 
 @dataclass(frozen=True)
@@ -128,16 +136,17 @@ class Search:
     ) -> Hypothesis:  # fmt: skip
         """Fit over longer and longer horizons, stopping where the misfit is above `ceiling`."""
         free = freedom(self.parameters, effects)
-        found = None
+        found, costs = None, {}
         for horizon in HORIZONS:
             if horizon > to:
                 break
             found = fit(self.problem, self.runs, vector, free, horizon, iterations)
             vector = found.vector
+            costs[horizon] = found.cost
             if found.level > ceiling:
                 break
         assert found is not None
-        return Hypothesis(effects, found, horizon)
+        return Hypothesis(effects, found, max(costs), costs)
 
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
@@ -162,7 +171,7 @@ class Search:
         if instead is not None and instead.effect == "periodic_disturbance":
             frequencies = [dict(instead.shape)["frequency"], *frequencies]
         response = self.problem.predict(self.runs[0], vector)
-        pieces, _ = self.problem.pieces(self.runs[0], vector)
+        pieces, _ = self.problem.pieces(self.runs[0], vector, 1)
         motion = Motion(
             parameters, vector, response.states, response.end, np.asarray(pieces.command),
             self.problem.setting.sample_time,
@@ -210,7 +219,11 @@ class Search:
         if own is None:
             return []
         return [
-            (item, item.gain) for item in rest if item.candidate.key != effect.key and item.gain > RIVAL * own
+            (item, item.gain)
+            for item in rest
+            if item.candidate.key != effect.key
+            and item.gain > RIVAL * own
+            and len(item.candidate.amplitudes) <= len(effect.amplitudes)
         ]
 
     def confirm(self, base: Hypothesis, starts: list[np.ndarray], ranked: Ranked, to: int) -> Hypothesis:

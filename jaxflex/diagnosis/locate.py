@@ -12,6 +12,7 @@ import numpy as np
 from .catalogue import Motion
 from .shooting import Linearised, Problem, Run
 
+PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece
 
 
@@ -61,7 +62,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
             forcing[e * blocks + b, :, edges[b] : edges[b + 1], column] = 1.0
     linear = problem.linearise(run, vector, [], forcing)
     response = problem.predict(run, vector)
-    pieces, _ = problem.pieces(run, vector)
+    pieces, _ = problem.pieces(run, vector, 1)
     motion = Motion(
         s.parameters, vector, response.states, response.end, np.asarray(pieces.command), s.sample_time
     )
@@ -167,7 +168,7 @@ def strongest_frequencies(force: LatentForce, count: int) -> list[float]:
     span = force.times[-1] - force.times[0]
     values = (force.values - force.values.mean()) * np.hanning(len(force.values))
     top = min(0.4 / step, 50.0)
-    grid = np.arange(max(1.0 / span, 0.05), top, 0.1 / span)
+    grid = np.arange(PERIODS / span, top, 0.1 / span)
     power = np.abs(np.exp(-2j * np.pi * np.outer(grid, force.times)) @ values) ** 2
     found: list[float] = []
     for k in np.argsort(-power):

@@ -23,8 +23,8 @@ from ..files.arm_file import ArmFile
 OUTSIDE = (InputDelay, AbstractSensorEffect)
 
 STABLE = 0.45  # of a step times the slope of friction over inertia
-SHARP = 0.6  # of a transition rate: widening that is small enough
-MOST_SUBSTEPS = 10
+SHARP = 0.15  # of a transition rate: widening that is small enough
+MOST_SUBSTEPS = 16
 DEFAULT_UNCERTAINTY = 0.05  # relative, where an arm file says nothing
 
 

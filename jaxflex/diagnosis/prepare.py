@@ -25,7 +25,7 @@ PIECE = 0.1  # s: the shortest horizon
 SHORTEST_PIECE = 10  # samples
 LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
-SMALLEST_NOISE = 1e-4  # of a channel's spread: no model is better than that
+SMALLEST_NOISE = 2e-4  # of a channel's spread: no model is better than that
 SAMPLES = 12_000  # of one recording that are used
 CALIBRATION = 0.6  # of a single recording; the rest is held out
 
@@ -138,7 +138,7 @@ def make_run(
 
 
 def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:
-    """Rate [rad/s] over which friction changes sign: 1 % of what each joint typically turns at."""
+    """Rate [rad/s] over which friction changes sign: 2 % of what each joint typically turns at."""
     found = []
     for i in range(1, len(arm.joints) + 1):
         rates = [1.0]
@@ -149,7 +149,7 @@ def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[
                 window = max(1, round(0.02 / dt))
                 angle = piece[f"angle_{i}"]
                 rates.append(float(np.std((angle[window:] - angle[:-window]) / (window * dt))))
-        found.append(0.01 * float(np.mean(rates[1:] or rates)))
+        found.append(0.02 * float(np.mean(rates[1:] or rates)))
     return found
 
 

@@ -30,7 +30,7 @@ def with_candidates(
     """A run made linear in the parameters at `columns`, then in every candidate's amplitudes."""
     parameters = problem.setting.parameters
     response = problem.predict(run, vector)
-    pieces, _ = problem.pieces(run, vector)
+    pieces, _ = problem.pieces(run, vector, 1)
     motion = Motion(
         parameters,
         vector,

@@ -24,6 +24,7 @@ from .parameters import Parameters
 from .plant import Direction, Instruments, Pieces, Response, respond, slopes, state_size
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
+SLOPE_SUBSTEPS = 4  # enough for slopes, which chord steps make up for
 LANES = 12  # directions differentiated side by side: one compiled program whatever their number
 
 
@@ -143,22 +144,19 @@ class Problem:
         s = self.setting
         return s.parameters.substeps(vector, s.sample_time, s.substeps)
 
-    def arm(self, vector: np.ndarray) -> Arm:
-        """The arm as it is integrated."""
-        step = self.setting.sample_time / self.substeps(vector)
+    def arm(self, vector: np.ndarray, substeps: int) -> Arm:
+        """The arm as it is integrated in so many steps a sample."""
+        step = self.setting.sample_time / substeps
         return self.setting.parameters.build(jnp.asarray(vector), step)
 
-    def _constants(self, vector: np.ndarray) -> AssembledArm:
-        return self.arm(vector).assemble()
-
-    def _tangents(self, vector: np.ndarray, directions: np.ndarray) -> Any:
-        step, at = self.setting.sample_time / self.substeps(vector), jnp.asarray(vector)
+    def _tangents(self, vector: np.ndarray, directions: np.ndarray, substeps: int) -> Any:
+        step, at = self.setting.sample_time / substeps, jnp.asarray(vector)
 
         def along(direction):
             moved = jax.jvp(lambda v: self.setting.parameters.build(v, step), (at,), (direction,))[1]
             return eqx.filter(moved, eqx.is_inexact_array)
 
-        return _assembled_along(self.arm(vector), jax.vmap(along)(jnp.asarray(directions)))
+        return _assembled_along(self.arm(vector, substeps), jax.vmap(along)(jnp.asarray(directions)))
 
     def instruments(self, vector: np.ndarray) -> Instruments:
         """The instruments that a parameter vector stands for."""
@@ -173,7 +171,7 @@ class Problem:
         gain, bias, drift, lag = (np.array(v, dtype=float) for v in values.values())
         return Instruments(1 + gain, bias, drift, lag)
 
-    def pieces(self, run: Run, vector: np.ndarray) -> tuple[Pieces, np.ndarray]:
+    def pieces(self, run: Run, vector: np.ndarray, substeps: int) -> tuple[Pieces, np.ndarray]:
         """The pieces of a run under the delays of `vector`, and the slope of commands with delay."""
         s = self.setting
         columns, rates = [], []
@@ -192,14 +190,13 @@ class Problem:
         time = run.times[0] + np.arange(total).reshape(shape) * s.sample_time
         command = np.stack([cut(c) for c in columns], -1)
         slope = np.stack([cut(c) for c in rates], -1)
-        return Pieces(
-            jnp.asarray(command), jnp.asarray(time), s.sample_time, jnp.asarray(self.substeps(vector))
-        ), slope
+        return Pieces(jnp.asarray(command), jnp.asarray(time), s.sample_time, jnp.asarray(substeps)), slope
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
-        model = self._constants(vector)
-        pieces, _ = self.pieces(run, vector)
+        substeps = self.substeps(vector)
+        model = self.arm(vector, substeps).assemble()
+        pieces, _ = self.pieces(run, vector, substeps)
         found = respond(
             model, self.instruments(vector), self.setting.channels, jnp.asarray(run.starts), pieces
         )
@@ -214,9 +211,10 @@ class Problem:
         sequence of changes of the commands and of forces on the coordinates.
         """
         s = self.setting
-        model = self._constants(vector)
+        substeps = min(self.substeps(vector), max(SLOPE_SUBSTEPS, s.substeps))
+        model = self.arm(vector, substeps).assemble()
         instruments = self.instruments(vector)
-        pieces, delay_slope = self.pieces(run, vector)
+        pieces, delay_slope = self.pieces(run, vector, substeps)
         response = self.predict(run, vector)
         states, joints, size = run.starts.shape[1], run.command.shape[1], model.size
         more = 0 if forcing is None else len(forcing)
@@ -238,7 +236,7 @@ class Problem:
 
         def some(first):
             part = slice(first, first + LANES)
-            arrays = self._tangents(vector, unit[part])
+            arrays = self._tangents(vector, unit[part], substeps)
             moved = self._instruments_along(unit[part])
             direction = Direction(
                 arrays, moved, jnp.asarray(start[part, None, :]), jnp.asarray(command[part]),

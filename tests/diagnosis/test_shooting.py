@@ -64,9 +64,10 @@ def test_pieces_joined_are_the_simulation(prepared):
     problem, run = prepared[0].problem, prepared[1]
     whole, start = prepared[0].calibration[0], np.zeros(prepared[0].calibration[0].starts.shape[1])
     vector = problem.setting.parameters.start
-    pieces, _ = problem.pieces(whole, vector)
+    substeps = problem.substeps(vector)
+    pieces, _ = problem.pieces(whole, vector, substeps)
     starts = np.zeros_like(whole.starts)
-    model = problem.arm(vector).assemble()
+    model = problem.arm(vector, substeps).assemble()
     starts[0] = start
     for j in range(whole.pieces - 1):
         found = respond(
