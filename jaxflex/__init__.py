@@ -45,6 +45,11 @@ from .dynamics.lagrange import lagrangian as lagrangian
 from .dynamics.lagrange import mass_matrix as mass_matrix
 from .dynamics.one_way import OneWayLink as OneWayLink
 from .effects import EFFECTS as EFFECTS
+from .effects import AbstractBodyEffect as AbstractBodyEffect
+from .effects import AbstractDriveEffect as AbstractDriveEffect
+from .effects import AbstractEffect as AbstractEffect
+from .effects import AbstractJointEffect as AbstractJointEffect
+from .effects import AbstractSensorEffect as AbstractSensorEffect
 
 # Files
 from .files.arm_file import ArmFile as ArmFile
@@ -52,9 +57,11 @@ from .files.arm_file import load_arm as load_arm
 from .files.arm_file import read_arm_file as read_arm_file
 from .files.arm_file import save_arm as save_arm
 from .files.fields import ArmFileError as ArmFileError
+from .files.prepare import prepare as prepare
+from .files.prepare import require_channels as require_channels
+from .files.read_recording import read_recording as read_recording
 from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
-from .files.recording import read_recording as read_recording
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 from .scalars import Scalar as Scalar

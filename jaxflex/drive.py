@@ -5,6 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from .arm.arm import AssembledArm
+from .effects import AbstractDriveEffect, AbstractJointEffect
 from .scalars import Scalar
 
 
@@ -34,10 +35,13 @@ def initial_currents(model: AssembledArm) -> tuple[Scalar, ...]:
     return tuple(zero for i in range(len(model.joints)) if has_current_state(model, i))
 
 
-def drive(model: AssembledArm, command: tuple, currents: tuple, rates: tuple) -> DriveState:
+def drive(
+    model: AssembledArm, command: tuple, currents: tuple, rates: tuple, memory: tuple | None = None
+) -> DriveState:
     """Voltages, currents and torques that follow from `command` (Foldager et al. (1)-(3)).
 
-    `currents` are those that are states; `rates` [rad/s] those of the joints. A voltage
+    `currents` are those that are states; `rates` [rad/s] those of the joints; `memory`
+    that of the drive effects. A voltage
     command is limited to the amplifier's range; a current or torque command is given as
     it is, and the voltage it takes is reported where there is a motor to tell.
     """
@@ -45,6 +49,9 @@ def drive(model: AssembledArm, command: tuple, currents: tuple, rates: tuple) ->
     states = iter(currents)
     for i, joint in enumerate(model.joints):
         motor, asked, rate = joint.motor, command[i], rates[i]
+        for effect, kept in zip(drive_effects(model), memory or (), strict=True):
+            if effect.index == i:
+                asked, motor = effect.command(asked, kept), effect.motor(motor, kept)
         zero = jnp.zeros_like(asked)
         if model.arm.drive == "torque" or motor is None:
             voltage, current, torque = zero, zero, asked
@@ -70,10 +77,33 @@ def drive(model: AssembledArm, command: tuple, currents: tuple, rates: tuple) ->
     return DriveState(tuple(voltages), tuple(all_currents), tuple(torques), tuple(current_rates))
 
 
-def effect_torques(model: AssembledArm, angles: tuple, rates: tuple) -> tuple[Scalar, ...]:
-    """Sum of the arm's effects at every joint [N m]."""
+def drive_effects(model: AssembledArm) -> tuple[AbstractDriveEffect, ...]:
+    """The effects that act in the drives, in the order of the arm."""
+    return tuple(e for e in model.arm.effects if isinstance(e, AbstractDriveEffect))
+
+
+def initial_drive_memory(model: AssembledArm) -> tuple | None:
+    """Memory of the drive effects at the start, one entry an effect; None if there are none."""
+    return tuple(effect.initial() for effect in drive_effects(model)) or None
+
+
+def drive_memory_rates(
+    model: AssembledArm, command: tuple, drives: DriveState, memory: tuple | None
+) -> tuple | None:
+    """Time derivative of the memory of the drive effects."""
+    if memory is None:
+        return None
+    return tuple(
+        effect.rate(command[effect.index], drives.current[effect.index], model.joints[effect.index].motor, kept)
+        for effect, kept in zip(drive_effects(model), memory, strict=True)
+    )
+
+
+def effect_torques(model: AssembledArm, angles: tuple, rates: tuple, time: Scalar) -> tuple[Scalar, ...]:
+    """Sum of the effects that act as torques on every joint [N m]."""
     torques = [jnp.zeros_like(rate) for rate in rates]
     for effect in model.arm.effects:
-        i = effect.joint
-        torques[i] = torques[i] + effect(angles[i], rates[i])
+        if isinstance(effect, AbstractJointEffect):
+            i = effect.index
+            torques[i] = torques[i] + effect(angles[i], rates[i], time)
     return tuple(torques)

@@ -7,7 +7,9 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from .arm.arm import AssembledArm
 from .arm.kinematics import poses, velocities
+from .beam.link_model import LinkModel
 from .drive import DriveState
+from .effects.sensor import first_order_lag
 from .scalars import Scalar, dot, optional_scalar, scalar
 
 UNITS = {
@@ -78,7 +80,7 @@ def read_channels(
             channels[f"current_{number}"] = drives.current[i]
     for i, link in enumerate(model.arm.links):
         number, constants = i + 1, model.links[i]
-        channels[f"tip_deflection_{number}"] = dot(constants.tip_deflection, etas[i]) + zero
+        channels[f"tip_deflection_{number}"] = measured_deflection(constants, etas[i]) + zero
         if link.thickness is not None:
             curvature = dot(constants.gauge_curvature, etas[i])
             channels[f"strain_{number}"] = link.thickness / 2 * curvature
@@ -89,6 +91,11 @@ def read_channels(
         for i, value in enumerate(tip_accelerations(model, q, qd, qdd), 1):
             channels[f"tip_acceleration_{i}"] = value
     return channels
+
+
+def measured_deflection(link: LinkModel, eta: tuple) -> Scalar:
+    """Tip deflection [m] from the tangent at the hub, or past the spring of a flexible joint."""
+    return dot(link.tip_deflection, eta) - link.length * dot(link.joint_twist, eta)  # pyright: ignore
 
 
 def tip_accelerations(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> list[Scalar]:
@@ -137,27 +144,3 @@ class Sensor(eqx.Module):
             return reading
         rounded = jnp.round(reading / self.resolution) * self.resolution
         return reading + jax.lax.stop_gradient(rounded - reading)
-
-
-def first_order_lag(
-    times: Float[Array, " times"], signal: Float[Array, " times"], lag: Scalar
-) -> Float[Array, " times"]:
-    """`lag y' + y = signal`, exact for a signal that is straight between its samples.
-
-    Starts in balance with the first sample. Differentiable at `lag = 0`, where it is
-    the signal itself.
-    """
-    some = lag > 0
-    safe = jnp.where(some, lag, 1.0)
-    steps = jnp.diff(times)
-    decay = jnp.where(some, jnp.exp(-steps / safe), 0.0)
-    # y1 = decay y0 + (mean - decay) u0 + (1 - mean) u1, with mean = (1 - decay) lag / step
-    mean = jnp.where(some, 1 - decay, 1.0) * lag / steps
-
-    def step(y, inputs):
-        a, m, u0, u1 = inputs
-        y = a * y + (m - a) * u0 + (1 - m) * u1
-        return y, y
-
-    _, tail = jax.lax.scan(step, signal[0], (decay, mean, signal[:-1], signal[1:]))
-    return jnp.concatenate([signal[:1], tail])

@@ -1,3 +1,5 @@
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -5,30 +7,138 @@ import pytest
 
 import jaxflex as jf
 from controllers import OpenLoop, Step
-from jaxflex.effects import EFFECTS, CableStiffness, CoulombFriction, LoadTorqueBias
+from jaxflex.effects import (
+    EFFECTS,
+    AbstractJointEffect,
+    Backlash,
+    CableStiffness,
+    CentrifugalStiffening,
+    CoulombFriction,
+    InputDelay,
+    JointFlexibility,
+    LoadTorqueBias,
+    RootCompliance,
+)
 
-FULL = {"torque": 0.3, "stiffness": 0.4, "coefficient": 0.2, "sine": 0.1}
+SIZE = {
+    "gap": 0.01, "limit": 2.0, "width": 0.3, "delay": 0.01, "change": 0.02, "mass": 0.02,
+    "inertia": 1e-3, "compliance": 0.02, "along_y": 2.0, "ratio": 0.05, "share": 1.0,
+    "bias": 0.1, "error": 0.1, "lag": 0.02, "rate": 0.05,
+}  # fmt: skip
+JOINT_EFFECTS = [name for name, kind in EFFECTS.items() if issubclass(kind, AbstractJointEffect)]
 
 
 def make(name, size):
     kind = EFFECTS[name]
-    first = next(iter(FULL.keys() & kind.__dataclass_fields__.keys()))
-    return kind(**{first: size * FULL[first]})
+    first = next(iter(kind.units))
+    return kind(size * SIZE.get(first, 0.2))
+
+
+def rig(*effects):
+    motor = jf.DCMotor(1.2, 0.06, 0.06, inductance=1.5e-3)
+    link = jf.Link(0.4, 0.15, 0.7, damping_ratio=0.01, modes=1)
+    joint = jf.Joint(hub_inertia=1e-3, viscous_friction=2e-4, motor=motor)
+    return jf.Arm((link,), (joint,), jf.Payload(0.02), drive="voltage", effects=effects)
+
+
+@pytest.mark.parametrize("name", JOINT_EFFECTS)
+def test_torques_vanish_at_zero_and_have_finite_gradients_at_rest(name):
+    zero, rest = jnp.zeros(()), jnp.array(0.3)
+    assert make(name, 0.0)(rest, jnp.array(1.5), rest) == 0.0
+    slopes = jax.grad(lambda s, a, v: make(name, s)(a, v, a), (0, 1, 2))(1.0, rest, zero)
+    assert np.isfinite(slopes).all()
+    assert make(name, 1.0).name == name and make(name, 1.0).index == 0
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))
-def test_zero_means_absent_and_gradients_are_finite_at_rest(name):
-    zero, rest = jnp.zeros(()), jnp.array(0.3)
-    assert make(name, 0.0)(rest, jnp.array(1.5)) == 0.0
-    slopes = jax.grad(lambda s, a, v: make(name, s)(a, v), (0, 1, 2))(1.0, rest, zero)
-    assert np.isfinite(slopes).all()
-    assert make(name, 1.0).name == name and make(name, 1.0).joint == 0
+def test_every_effect_simulates_and_is_absent_at_zero(name):
+    times = jnp.linspace(0.0, 0.8, 81)
+    reference = Step((0.0,), (4.0,), 0.1)
+
+    def run(*effects):
+        # at rest at an angle, so that gravity and springs have something to do
+        start = jf.InitialState(angles=jnp.array([0.5]), rates=jnp.array([0.1]))
+        return jf.simulate(rig(*effects), OpenLoop(), reference, times, initial=start)["angle_1"]
+
+    nominal = run()
+    if name != "backlash":  # without a gap its flanks still give way
+        np.testing.assert_allclose(run(make(name, 0.0)), nominal, atol=2e-5)
+    changed = run(make(name, 5.0 if name == "centrifugal_stiffening" else 1.0))
+    assert np.abs(changed - nominal).max() > 1e-4
+
+
+def test_a_clamp_that_gives_way_is_a_spring_at_the_root():
+    """Against an arm with a free joint held by a spring: the same frequencies."""
+    arm = jf.Arm((jf.Link(0.4, 0.15, 0.7, modes=5),), (jf.Joint(hub_inertia=0.0),), jf.Payload(0.02))
+    spring = 20.0
+    held = jf.driven_frequencies(arm, joint_stiffness=jnp.array([spring]))
+    for effect in (RootCompliance(1 / spring), JointFlexibility(1 / spring)):
+        soft = dataclasses.replace(arm, effects=(effect,))
+        np.testing.assert_allclose(jf.locked_frequencies(soft)[:2], held[:2], rtol=2e-4)
+    lumped = dataclasses.replace(
+        arm, links=(dataclasses.replace(arm.links[0], model="lumped", segments=40),),
+        effects=(RootCompliance(1 / spring),),
+    )  # fmt: skip
+    np.testing.assert_allclose(jf.locked_frequencies(lumped)[:2], held[:2], rtol=5e-3)
+
+
+def test_shortening_gives_the_known_stiffness_of_a_turning_beam():
+    """Southwell: a clamped beam turning at W in its plane of bending has w^2 = w0^2 + (1.193 - 1) W^2."""
+    link = jf.Link(1.0, 0.3, 2.0, modes=3, mode_shapes="clamped_free")
+    hub = jf.Joint(hub_inertia=1e6)
+
+    def lowest(rate, *effects):
+        arm = jf.Arm((link,), (hub,), effects=effects).assemble()
+        qd = jnp.array([rate, 0.0, 0.0, 0.0])
+        stiffness = -jax.hessian(lambda q: jf.lagrangian(arm, q, qd))(jnp.zeros(4))[1:, 1:]
+        mass = jf.mass_matrix(arm, jnp.zeros(4))[1:, 1:]
+        return jnp.linalg.eigvals(jnp.linalg.solve(mass, stiffness)).real.min()
+
+    rate = 2.0
+    still = lowest(0.0)
+    assert (lowest(rate) - still) / rate**2 == pytest.approx(-1.0, abs=1e-6)
+    full = (lowest(rate, CentrifugalStiffening(1.0)) - still) / rate**2
+    assert full == pytest.approx(0.193, abs=0.003)
+
+
+def test_a_delay_is_a_delay():
+    late = rig(InputDelay(0.02))
+    times = jnp.linspace(0.0, 0.6, 121)
+    on_time = jf.simulate(rig(), OpenLoop(), Step((0.0,), (2.0,), 0.12), times)["angle_1"]
+    delayed = jf.simulate(late, OpenLoop(), Step((0.0,), (2.0,), 0.1), times)["angle_1"]
+    np.testing.assert_allclose(delayed, on_time, atol=2e-3 * float(on_time.max()))
+
+
+def test_play_keeps_its_energy_and_lets_the_link_turn_freely():
+    """The link crosses its gap at constant rate, then bounces back elastically."""
+    arm = jf.Arm(
+        (jf.Link(0.4, 0.15, 200.0, modes=1),), (jf.Joint(hub_inertia=50.0),), jf.Payload(0.02),
+        effects=(Backlash(0.1, contact_stiffness=2000.0),),
+    )  # fmt: skip
+    start = jf.InitialState(deflection_rates=jnp.array([0.0, 1.0]))
+    times = jnp.linspace(0.0, 0.04, 5)
+    run = jf.simulate(
+        arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start, method=jf.Adaptive(rtol=1e-9)
+    )
+    np.testing.assert_allclose(run.state.q[2], times, rtol=1e-4, atol=1e-9)
+    model = arm.assemble()
+
+    def energy(q, qd):
+        return jf.kinetic_energy(model, q, qd) + jf.potential_energy(model, q)
+
+    later = jf.simulate(
+        arm, OpenLoop(), Step((0.0,), (0.0,)), jnp.linspace(0, 0.3, 61), initial=start,
+        method=jf.Adaptive(rtol=1e-10, atol=1e-12),
+    )  # fmt: skip
+    total = jax.vmap(energy)(later.state.q, later.state.qd)
+    np.testing.assert_allclose(total, total[0], rtol=1e-5)
+    assert np.abs(later.state.q[2]).max() < 0.06
 
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction", "quadratic_drag"])
 def test_friction_takes_energy(name):
-    rates = jnp.linspace(-2.0, 2.0, 41)
-    power = jax.vmap(lambda v: make(name, 1.0)(jnp.zeros(()), v) * v)(rates)
+    rates, zero = jnp.linspace(-2.0, 2.0, 41), jnp.zeros(())
+    power = jax.vmap(lambda v: make(name, 1.0)(zero, v, zero) * v)(rates)
     assert np.all(np.asarray(power) <= 0) and power.min() < 0
 
 

@@ -5,10 +5,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..arm.arm import Arm, AssembledArm
+from ..arm.parts import Joint
 from ..beam.basis import make_basis
 from ..beam.eigen import whiten
 from ..beam.mode_shapes import natural_frequencies as beam_frequencies
 from ..dynamics.lagrange import mass_matrix
+from ..scalars import scalar
 
 JointVector = Float[Array, " joints"]
 
@@ -65,14 +67,14 @@ def clamped_frequencies(arm: Arm, link: int) -> Float[Array, " modes"]:
         return jnp.zeros(0)
     distal = arm.distal(link)
     if part.model == "lumped":
-        constants = part.discretise(distal, link + 1 < len(arm.links))
+        constants = part.discretise(distal, link + 1 < len(arm.links), Joint())
         tip, slope = jnp.stack(constants.tip_deflection), jnp.stack(constants.tip_slope)
         mass = jnp.array(constants.modal_inertia) + distal.mass * jnp.outer(tip, tip)
         mass = mass + distal.inertia * jnp.outer(slope, slope)
         return undamped_frequencies(jnp.diag(jnp.stack(constants.stiffness)), mass)[: part.modes]
     basis = make_basis(
         "clamped_tip_mass", part.modes, part.length, part.mass_per_length,
-        part.flexural_rigidity, distal, False,
+        part.flexural_rigidity, distal, False, scalar(0.0),
     )  # fmt: skip
     omega = beam_frequencies(basis.modes, part.mass_per_length, part.flexural_rigidity)
     return omega / (2 * jnp.pi)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from ..beam.basis import Distal
 from ..beam.link_model import LinkModel, rigid_link
-from ..effects import AbstractJointEffect
+from ..effects import AbstractBodyEffect, AbstractEffect
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
 from .parts import Joint, Link, Payload
 
@@ -28,6 +28,7 @@ class Arm(eqx.Module):
     - `gravity` [m/s^2] along -y of the base; None for a horizontal arm
     - `drive`: what the controller commands: `"voltage"`, `"current"` or `"torque"`
     - `effects`: physics beyond the nominal arm, see `jaxflex.EFFECTS`
+    - `side_gravity` [m/s^2] along -x of the base, of an arm whose base is tilted
 
     Deflections are small: the model is linear in the curvature of a link, exact in the
     rotation of the joints.
@@ -38,8 +39,9 @@ class Arm(eqx.Module):
     payload: Payload = eqx.field(default_factory=Payload)
     gravity: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     drive: str = eqx.field(static=True, default="torque")
-    effects: tuple[AbstractJointEffect, ...] = ()
+    effects: tuple[AbstractEffect, ...] = ()
     name: str = eqx.field(static=True, default="arm")
+    side_gravity: Scalar | None = eqx.field(converter=optional_scalar, default=None)
 
     def __check_init__(self):
         if not self.joints:
@@ -59,11 +61,19 @@ class Arm(eqx.Module):
                         "none: give it one or set the drive to 'torque'."
                     )
         for effect in self.effects:
-            if effect.joint >= len(self.joints):
-                raise ValueError(
-                    f"effect {effect.name!r} is at {effect.location}, but the arm has "
-                    f"{len(self.joints)} joint(s)."
-                )
+            self._check_place(effect)
+
+    def _check_place(self, effect: AbstractEffect) -> None:
+        if effect.place in ("tip", "base", "channel"):
+            return
+        parts = self.links if effect.place == "link" else self.joints
+        if effect.index >= len(parts):
+            raise ValueError(
+                f"effect {effect.name!r} is at {effect.location}, but the arm has "
+                f"{len(self.joints)} joint(s) and {len(self.links)} link(s)."
+            )
+        if effect.place == "motor" and self.joints[effect.index].motor is None:
+            raise ValueError(f"effect {effect.name!r} needs a motor at {effect.location}, which has none.")
 
     def with_payload(self, mass: ScalarLike, inertia: ScalarLike | None = None) -> "Arm":
         """The same arm with another payload mass [kg] and, if given, inertia [kg m^2]."""
@@ -98,14 +108,18 @@ class Arm(eqx.Module):
 
     @eqx.filter_jit
     def assemble(self) -> "AssembledArm":
-        """The arm with every constant of its links computed, ready for the energies."""
+        """The arm with its body effects applied and every constant of its links computed."""
+        arm = self
+        for effect in self.effects:
+            if isinstance(effect, AbstractBodyEffect):
+                arm = effect.apply(arm)
         models = []
-        for i in range(len(self.joints)):
-            if i < len(self.links):
-                models.append(self.links[i].discretise(self.distal(i), i + 1 < len(self.links)))
+        for i, joint in enumerate(arm.joints):
+            if i < len(arm.links):
+                models.append(arm.links[i].discretise(arm.distal(i), i + 1 < len(arm.links), joint))
             else:
                 models.append(rigid_link(scalar(0.0), scalar(0.0)))
-        return AssembledArm(self, tuple(models))
+        return AssembledArm(arm, tuple(models))
 
 
 class AssembledArm(eqx.Module):

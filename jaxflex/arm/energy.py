@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 
+from ..beam.link_model import half_form
 from ..scalars import Scalar, dot
 from .arm import AssembledArm
 from .kinematics import poses, velocities
@@ -36,6 +37,13 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
             + dot(eta_rate, link.inertia_times(eta_rate))
             + 2 * (omega * (v * link.first_moment - u * bent + spin) + v * bending)
         )
+        if link.shortening is not None:
+            # a point that bending draws in by s(x) moves with (u - s', v + omega (x - s)): to the
+            # second order in the deflection, that is what the cross terms with s take away
+            short = link.shortening
+            drawn, spun = half_form(short.mean, eta, eta), half_form(short.moment, eta, eta)
+            drawing = 2 * half_form(short.mean, eta, eta_rate)
+            twice = twice - 2 * (u * drawing + omega * (v * drawn + omega * spun))
         twice = twice + joint.hub_inertia * omega * omega
         twice = twice + joint.reflected_inertia * rates[i] * rates[i]
         if i > 0:
@@ -50,16 +58,35 @@ def potential_energy(model: AssembledArm, q: tuple) -> Scalar:
     """`U` [J]: bending of the links (Ahmad et al. (14)), and gravity where there is any."""
     _, etas = model.split(q)
     energy = jnp.zeros_like(model.arm.payload.mass)
-    for link, eta in zip(model.links, etas, strict=True):
+    for link, joint, eta in zip(model.links, model.joints, etas, strict=True):
         energy = energy + 0.5 * dot(link.stiffness, tuple(e * e for e in eta))
-    if model.arm.gravity is None:
+        if link.loose:
+            pressed = jnp.maximum(jnp.abs(eta[-1]) - joint.play / 2, 0.0)
+            energy = energy + 0.5 * joint.contact_stiffness * pressed * pressed
+    if model.arm.gravity is None and model.arm.side_gravity is None:
         return energy
+    moment_x, moment_y = mass_moments(model, q)
+    if model.arm.gravity is not None:
+        energy = energy + model.arm.gravity * moment_y
+    if model.arm.side_gravity is not None:
+        energy = energy + model.arm.side_gravity * moment_x
+    return energy
+
+
+def mass_moments(model: AssembledArm, q: tuple) -> tuple[Scalar, Scalar]:
+    """`(int x dm, int y dm)` [kg m] of the whole arm in the base frame."""
+    _, etas = model.split(q)
     frames, tips = poses(model, q)
-    moment = model.arm.payload.mass * tips[-1].y
+    payload = model.arm.payload.mass
+    along, across = payload * tips[-1].x, payload * tips[-1].y
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
         frame = frames[i]
         c, s = jnp.cos(frame.heading), jnp.sin(frame.heading)
         bent = dot(link.deflection_integral, etas[i])
-        moment = moment + (link.mass + joint.hub_mass) * frame.y
-        moment = moment + s * link.first_moment + c * bent
-    return energy + model.arm.gravity * moment
+        reach = link.first_moment
+        if link.shortening is not None:
+            reach = reach - half_form(link.shortening.mean, etas[i], etas[i])
+        mass = link.mass + joint.hub_mass
+        along = along + mass * frame.x + c * reach - s * bent
+        across = across + mass * frame.y + s * reach + c * bent
+    return along, across

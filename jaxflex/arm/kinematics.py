@@ -15,6 +15,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..beam.link_model import LinkModel, half_form
 from ..scalars import Scalar, dot
 from .arm import Arm, AssembledArm
 
@@ -51,9 +52,12 @@ def velocities(model: AssembledArm, q: tuple, qd: tuple) -> tuple[list[FrameVelo
     frame = FrameVelocity(0.0, 0.0, rates[0])
     for i, link in enumerate(model.links):
         deflection = dot(link.tip_deflection, etas[i])
+        length, shrinking = reach(link, etas[i]), 0.0
+        if link.shortening is not None:
+            shrinking = 2 * half_form(link.shortening.tip, etas[i], eta_rates[i])
         tip = TipVelocity(
-            frame.x - frame.rate * deflection,
-            frame.y + frame.rate * link.length + dot(link.tip_deflection, eta_rates[i]),
+            frame.x - frame.rate * deflection - shrinking,
+            frame.y + frame.rate * length + dot(link.tip_deflection, eta_rates[i]),
             frame.rate + dot(link.tip_slope, eta_rates[i]),
         )
         frames.append(frame)
@@ -72,10 +76,11 @@ def poses(model: AssembledArm, q: tuple) -> tuple[list[Pose], list[Pose]]:
     frame = Pose(0.0, 0.0, angles[0])
     for i, link in enumerate(model.links):
         deflection = dot(link.tip_deflection, etas[i])
+        length = reach(link, etas[i])
         c, s = jnp.cos(frame.heading), jnp.sin(frame.heading)
         tip = Pose(
-            frame.x + c * link.length - s * deflection,
-            frame.y + s * link.length + c * deflection,
+            frame.x + c * length - s * deflection,
+            frame.y + s * length + c * deflection,
             frame.heading + dot(link.tip_slope, etas[i]),
         )
         frames.append(frame)
@@ -83,6 +88,13 @@ def poses(model: AssembledArm, q: tuple) -> tuple[list[Pose], list[Pose]]:
         if i + 1 < len(model.links):
             frame = Pose(tip.x, tip.y, tip.heading + angles[i + 1])
     return frames, tips
+
+
+def reach(link: LinkModel, eta: tuple) -> Scalar:
+    """Length [m] of a link along its own axis: `l - s(l)` where bending shortens it."""
+    if link.shortening is None:
+        return link.length
+    return link.length - half_form(link.shortening.tip, eta, eta)
 
 
 def tip_position(arm: Arm, angles: Float[Array, " joints"]) -> Float[Array, "2"]:

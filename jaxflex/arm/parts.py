@@ -32,6 +32,9 @@ class Link(eqx.Module):
     - `thickness` [m] in the plane of bending, needed for strain alone
     - `gauge_position` [m] of the strain gauge from the root
     - `root_stiffness` [N m/rad] of the `hinged_hub` shapes
+    - `root_compliance` [rad/(N m)] of the clamp that holds the link to its hub
+    - `shortening`: share of the shortening by bending that is counted, 1 for all of it
+      (centrifugal stiffening); None to leave it out
     """
 
     length: Scalar = eqx.field(converter=scalar)
@@ -45,6 +48,8 @@ class Link(eqx.Module):
     thickness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     gauge_position: Scalar = eqx.field(converter=scalar, default=0.0)
     root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
+    root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
+    shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
 
     def __check_init__(self):
         if self.modes < 0:
@@ -84,14 +89,14 @@ class Link(eqx.Module):
         """Mass of the link [kg]."""
         return self.mass_per_length * self.length
 
-    def basis(self, distal: Distal, carries_link: bool) -> Basis:
+    def basis(self, distal: Distal, carries_link: bool, joint_compliance: ScalarLike = 0.0) -> Basis:
         """The deflection shapes of an assumed-modes link with `distal` at its ends."""
         return make_basis(
             self.mode_shapes, self.modes, self.length, self.mass_per_length,
-            self.flexural_rigidity, distal, carries_link,
+            self.flexural_rigidity, distal, carries_link, self.root_compliance + scalar(joint_compliance),
         )  # fmt: skip
 
-    def discretise(self, distal: Distal, carries_link: bool) -> LinkModel:
+    def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         """The constants of the link, its shapes chosen for what hangs on it."""
         if self.modes == 0:
             return rigid_link(self.length, self.mass)
@@ -99,10 +104,12 @@ class Link(eqx.Module):
             return lumped_link(
                 self.length, self.mass_per_length, self.flexural_rigidity,
                 self.damping_ratio, self.gauge_position, self.segments, None, distal.mass,
+                self.root_compliance, joint.compliance,
             )  # fmt: skip
         return assumed_modes_link(
-            self.basis(distal, carries_link), self.mass_per_length,
+            self.basis(distal, carries_link, joint.compliance), self.mass_per_length,
             self.flexural_rigidity, self.damping_ratio, self.gauge_position,
+            joint.compliance, self.shortening, joint.play is not None,
         )  # fmt: skip
 
 
@@ -117,6 +124,10 @@ class Joint(eqx.Module):
     - `rotor_inertia` I_r [kg m^2], turning at the gear ratio times the joint's rate
       (Ahmad et al. (7))
     - `motor`: a `DCMotor`, or None for a joint driven by a torque
+    - `compliance` [rad/(N m)] of the spring between motor and link; the hub inertia stays
+      on the motor's side, and so do the joint's angle and rate
+    - `play` [rad] between motor and link (None: no play), `contact_stiffness` [N m/rad]
+      of its flanks
     """
 
     hub_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
@@ -124,6 +135,9 @@ class Joint(eqx.Module):
     viscous_friction: Scalar = eqx.field(converter=scalar, default=0.0)
     rotor_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
     motor: DCMotor | None = None
+    compliance: Scalar = eqx.field(converter=scalar, default=0.0)
+    play: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    contact_stiffness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
 
     @property
     def reflected_inertia(self) -> Scalar:

@@ -44,33 +44,46 @@ class Basis(eqx.Module):
     The raw shapes are mode shapes, and with `end_moment` also `(x/l)^2`, the static
     deflection under a moment at the tip. A shape that is not tangent at the root has
     its root slope removed, `phi(x) - phi'(0) x`: with the joint's own rotation it spans
-    the same motions, and the joint angle stays the angle of the hub.
+    the same motions, and the joint angle stays the angle of the hub. What gives way at the
+    root, turning by `root_compliance` times the moment there, is then added to every
+    shape: `c EI phi''(0) x`, the boundary condition of a sprung root.
     """
 
     modes: ModeShapes
     mixing: Float[Array, "raw shapes"]
     end_moment: bool = eqx.field(static=True)
+    give: Scalar  # c EI [m]: root rotation for a unit of curvature there
 
-    def _raw(self, modal: Array, root_slope: Array, moment: Array) -> Array:
+    def _raw(self, modal: Array, root_slope: Array, moment: Array, arm: Scalar) -> Array:
         values = modal - root_slope
-        return jnp.append(values, moment) if self.end_moment else values
+        values = jnp.append(values, moment) if self.end_moment else values
+        return values + self.give * arm * self._root_curvature()
+
+    def _root_curvature(self) -> Array:
+        bend = self.modes.curvature(jnp.zeros_like(self.modes.length))
+        return jnp.append(bend, 2 / self.modes.length**2) if self.end_moment else bend
+
+    def root_rotation(self) -> Float[Array, " shapes"]:
+        """Rotation [rad] of the root against the hub for a unit of each shape."""
+        return self.give * self._root_curvature() @ self.mixing
 
     def deflection(self, x: Scalar) -> Float[Array, " shapes"]:
         """`psi_k(x)`, dimensionless, at `x` [m] from the root."""
         length = self.modes.length
         root_slope = self.modes.slope(jnp.zeros_like(length)) * x
-        return self._raw(self.modes.deflection(x), root_slope, (x / length) ** 2) @ self.mixing
+        return self._raw(self.modes.deflection(x), root_slope, (x / length) ** 2, x) @ self.mixing
 
     def slope(self, x: Scalar) -> Float[Array, " shapes"]:
         """`psi_k'(x)` [1/m]."""
         length = self.modes.length
         root_slope = self.modes.slope(jnp.zeros_like(length))
-        return self._raw(self.modes.slope(x), root_slope, 2 * x / length**2) @ self.mixing
+        one = jnp.ones_like(length)
+        return self._raw(self.modes.slope(x), root_slope, 2 * x / length**2, one) @ self.mixing
 
     def curvature(self, x: Scalar) -> Float[Array, " shapes"]:
         """`psi_k''(x)` [1/m^2]."""
-        length = self.modes.length
-        return self._raw(self.modes.curvature(x), jnp.zeros(()), 2 / length**2) @ self.mixing
+        length, none = self.modes.length, jnp.zeros(())
+        return self._raw(self.modes.curvature(x), none, 2 / length**2, none) @ self.mixing
 
 
 def quadrature(length: Scalar) -> tuple[Float[Array, " points"], Float[Array, " points"]]:
@@ -96,12 +109,14 @@ def make_basis(
     flexural_rigidity: Scalar,
     distal: Distal,
     carries_link: bool,
+    root_compliance: Scalar,
 ) -> Basis:
     """The basis named `kind` (a key of `MODE_SHAPES`) with `modes` mode shapes.
 
     Shapes are scaled to a modal mass equal to the mass of the link (as Ahmad et al. do:
     stiffness `omega^2 m_i`), the distal mass counted with them where the kind has one,
-    and to a positive deflection at the tip.
+    and to a positive deflection at the tip. `root_compliance` [rad/(N m)] lies between
+    hub and root.
 
     **Raises** `ValueError` for an unknown kind.
     """
@@ -128,7 +143,8 @@ def make_basis(
     )
     shapes = solve_mode_shapes(length, ends, modes)
     end_moment = kind == "distal_mass_and_moment" and carries_link
-    raw = Basis(shapes, jnp.eye(modes + end_moment), end_moment)
+    give = root_compliance * flexural_rigidity
+    raw = Basis(shapes, jnp.eye(modes + end_moment), end_moment, give)
 
     points, weights = quadrature(length)
     phi = jax.vmap(raw.deflection)(points)
@@ -139,7 +155,8 @@ def make_basis(
         + tip_mass * jnp.outer(tip, tip)
         + tip_inertia * jnp.outer(tip_slope, tip_slope)
     )
-    stiffness = flexural_rigidity * (bend.T * weights) @ bend
+    moment = flexural_rigidity * raw.curvature(zero)
+    stiffness = flexural_rigidity * (bend.T * weights) @ bend + root_compliance * jnp.outer(moment, moment)
     mixing = orthogonalise(mass, stiffness, link_mass)
     upward = jnp.where(tip @ mixing < 0, -1.0, 1.0)
-    return Basis(shapes, mixing * upward, end_moment)
+    return Basis(shapes, mixing * upward, end_moment, give)

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..scalars import Scalar, dot
+from ..scalars import Scalar, ScalarLike, dot, scalar
 from .basis import Basis, orthogonalise, quadrature
 
 
@@ -30,6 +30,9 @@ class LinkModel(eqx.Module):
     - `stiffness` `int EI psi_k'' psi_k'' dx` [N/m]; `damping` [N s/m]
     - `tip_deflection` `psi_k(l)`; `tip_slope` `psi_k'(l)` [1/m];
       `gauge_curvature` `psi_k''` at the strain gauge [1/m^2]
+    - `joint_twist`: rotation [rad] of the link's root against the motor, for which the
+      joint's spring or play gives way; `loose`: the last shape is the play
+    - `shortening`: what bending takes off the length, None where it is left out
     """
 
     length: Scalar
@@ -44,6 +47,9 @@ class LinkModel(eqx.Module):
     tip_deflection: tuple[Scalar, ...]
     tip_slope: tuple[Scalar, ...]
     gauge_curvature: tuple[Scalar, ...]
+    joint_twist: tuple[Scalar, ...] = ()
+    shortening: "Shortening | None" = None
+    loose: bool = eqx.field(static=True, default=False)
 
     @property
     def shapes(self) -> int:
@@ -53,6 +59,22 @@ class LinkModel(eqx.Module):
     def inertia_times(self, rates: tuple) -> tuple:
         """`int rho psi psi^T dx` times a tuple of modal quantities."""
         return tuple(dot(row, rates) for row in self.modal_inertia)
+
+
+class Shortening(eqx.Module):
+    """How much shorter a bent link is: `s(x) = 1/2 eta^T S(x) eta`, `S = int_0^x psi' psi'^T`.
+
+    Rows of `S` at the tip [1/m], of `int rho S dx` [kg/m], and of `int rho x S dx` [kg].
+    """
+
+    tip: tuple[tuple[Scalar, ...], ...]
+    mean: tuple[tuple[Scalar, ...], ...]
+    moment: tuple[tuple[Scalar, ...], ...]
+
+
+def half_form(rows: tuple[tuple[Scalar, ...], ...], a: tuple, b: tuple) -> Scalar | float:
+    """`1/2 a^T rows b` over scalars."""
+    return 0.5 * dot(a, tuple(dot(row, b) for row in rows))
 
 
 def rigid_link(length: Scalar, mass: Scalar) -> LinkModel:
@@ -86,15 +108,39 @@ def assumed_modes_link(
     flexural_rigidity: Scalar,
     damping_ratio: tuple[Scalar, ...] | str,
     gauge_position: Scalar,
+    joint_compliance: ScalarLike = 0.0,
+    shortening: Scalar | None = None,
+    loose: bool = False,
 ) -> LinkModel:
-    """The link whose deflection is a sum over `basis` (Ahmad et al. (19), Foldager et al. (8))."""
+    """The link whose deflection is a sum over `basis` (Ahmad et al. (19), Foldager et al. (8)).
+
+    `joint_compliance` [rad/(N m)] is the joint's part of the basis' root compliance;
+    `shortening` the share of it that is counted; a `loose` link has one more shape, the
+    rotation of its root in the play of the joint.
+    """
     length = basis.modes.length
     points, weights = quadrature(length)
     psi = jax.vmap(basis.deflection)(points)
     bend = jax.vmap(basis.curvature)(points)
     rho = mass_per_length * weights
     mass = mass_per_length * length
-    stiffness = tuple(jnp.sum(flexural_rigidity * weights[:, None] * bend**2, axis=0))
+    root = basis.root_rotation()
+    springs = jnp.sum(flexural_rigidity * weights[:, None] * bend**2, axis=0)
+    moment = flexural_rigidity * basis.curvature(jnp.zeros_like(length))
+    springs = springs + basis.give / flexural_rigidity * moment**2
+    stiffness = tuple(springs)
+    damping = modal_damping(stiffness, mass, damping_ratio)
+    tip, tip_slope = basis.deflection(length), basis.slope(length)
+    gauge = basis.curvature(gauge_position)
+    # the twist of the joint is the joint's share of what the root gives
+    some = basis.give > 0
+    share = jnp.where(some, scalar(joint_compliance) * flexural_rigidity / jnp.where(some, basis.give, 1.0), 0.0)
+    twist = share * root
+    if loose:
+        psi = jnp.column_stack([psi, points])
+        tip, tip_slope = jnp.append(tip, length), jnp.append(tip_slope, 1.0)
+        gauge, twist = jnp.append(gauge, 0.0), jnp.append(twist, 1.0)
+        stiffness, damping = (*stiffness, jnp.zeros_like(length)), (*damping, jnp.zeros_like(length))
     return LinkModel(
         length=length,
         mass=mass,
@@ -104,10 +150,35 @@ def assumed_modes_link(
         rotation_integral=tuple((rho * points) @ psi),
         modal_inertia=_rows((psi.T * rho) @ psi),
         stiffness=stiffness,
-        damping=modal_damping(stiffness, mass, damping_ratio),
-        tip_deflection=tuple(basis.deflection(length)),
-        tip_slope=tuple(basis.slope(length)),
-        gauge_curvature=tuple(basis.curvature(gauge_position)),
+        damping=damping,
+        tip_deflection=tuple(tip),
+        tip_slope=tuple(tip_slope),
+        gauge_curvature=tuple(gauge),
+        joint_twist=tuple(twist),
+        shortening=None if shortening is None else _shortening(basis, mass_per_length, shortening, loose),
+        loose=loose,
+    )
+
+
+def _shortening(basis: Basis, mass_per_length: Scalar, share: Scalar, loose: bool) -> Shortening:
+    length = basis.modes.length
+    points, weights = quadrature(length)
+
+    def slopes(x):
+        slope = basis.slope(x)
+        return jnp.append(slope, 1.0) if loose else slope
+
+    def upto(x):
+        inner, inner_weights = points * x / length, weights * x / length
+        slope = jax.vmap(slopes)(inner)
+        return (slope.T * inner_weights) @ slope
+
+    at = jax.vmap(upto)(points)
+    rho = mass_per_length * weights
+    return Shortening(
+        tip=_rows(share * upto(length)),
+        mean=_rows(share * jnp.einsum("p,pij->ij", rho, at)),
+        moment=_rows(share * jnp.einsum("p,pij->ij", rho * points, at)),
     )
 
 
@@ -124,6 +195,8 @@ def lumped_link(
     segments: int,
     modes: int | None,
     tip_mass: Scalar,
+    root_compliance: ScalarLike = 0.0,
+    joint_compliance: ScalarLike = 0.0,
 ) -> LinkModel:
     """The lumped-parameter link of Foldager et al. (section 4): masses on massless springs.
 
@@ -150,7 +223,8 @@ def lumped_link(
     tip_lift = length - index * h
     mass = mass_per_length * length
     point_mass = mass / segments
-    springs = jnp.where(index == 0, 2.0, 1.0) * flexural_rigidity / h
+    give = scalar(root_compliance) + scalar(joint_compliance)  # in series with the first spring
+    springs = 1 / (jnp.where(index == 0, 0.5, 1.0) * h / flexural_rigidity + jnp.where(index == 0, give, 0.0))
     inertia = point_mass * lift.T @ lift
     mixing = orthogonalise(inertia + tip_mass * jnp.outer(tip_lift, tip_lift), jnp.diag(springs), mass)
     mixing = mixing[:, :modes]
@@ -158,7 +232,8 @@ def lumped_link(
     psi = lift @ mixing
     stiffness = tuple(springs @ mixing**2)
     # curvature at the gauge: the angle of its spring spread over the length that it stands for
-    bends = mixing / jnp.where(index == 0, h / 2, h)[:, None]
+    angles = mixing * (springs * jnp.where(index == 0, 0.5, 1.0) * h / flexural_rigidity)[:, None]
+    bends = angles / jnp.where(index == 0, h / 2, h)[:, None]
     stations = jnp.where(index == 0, h / 4, index * h)
     gauge = jax.vmap(lambda column: jnp.interp(gauge_position, stations, column), 1)(bends)
     return LinkModel(
@@ -174,4 +249,5 @@ def lumped_link(
         tip_deflection=tuple(tip_lift @ mixing),
         tip_slope=tuple(mixing.sum(axis=0)),
         gauge_curvature=tuple(gauge),
+        joint_twist=tuple(scalar(joint_compliance) * springs[0] * mixing[0]),
     )

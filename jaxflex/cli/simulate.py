@@ -20,7 +20,7 @@ from ..arm.arm import Arm
 from ..arm.library import ahmad_arm
 from ..control import AbstractController, AbstractReference
 from ..files.arm_file import read_arm_file
-from ..files.recording import read_recording
+from ..files.read_recording import read_recording
 from ..files.tables import write_series
 from ..plotting import plot_trajectory
 from ..simulation.simulate import InitialState

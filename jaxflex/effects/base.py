@@ -1,40 +1,100 @@
-"""What an effect is: where it acts, and what it adds there."""
+"""What an effect is: physics that the nominal arm leaves out, each with zero meaning absent."""
 
 from abc import abstractmethod
+from typing import Any
 
 import equinox as eqx
+from jaxtyping import Array, Float, PyTree
 
 from ..scalars import Scalar
 
 
-class AbstractJointEffect(eqx.Module):
-    """A torque that a joint feels beside its motor: `effect(angle, rate)` [N m].
+class AbstractEffect(eqx.Module):
+    """One missing piece of physics at one place.
 
-    A new effect is a class with a `name`, a `location` such as `"joint_1"`, its
-    parameters as scalars of which zero means absent, and `__call__`.
+    A new effect derives from one of the four interfaces below, which say where it acts:
+    at a joint, in the drive, on the body of the arm, or in a sensor. It states
+
+    - `name`: as files and reports call it
+    - `looks_like`: one sentence on what it leaves behind in a residual
+    - `place`: `"joint"`, `"motor"` (a joint that has one), `"link"`, `"tip"`, `"base"`
+      or `"channel"`
+    - `units`: of each parameter, in the order of the fields
+    - `location`: `joint_1`, `link_2`, `tip`, `base`, or the name of a channel
+
+    and its parameters as scalars, of which the first is zero where the effect is absent.
     """
 
     name: eqx.AbstractClassVar[str]
+    looks_like: eqx.AbstractClassVar[str]
+    place: eqx.AbstractClassVar[str]
+    units: eqx.AbstractClassVar[dict[str, str]]
     location: eqx.AbstractVar[str]
 
-    @abstractmethod
-    def __call__(self, angle: Scalar, rate: Scalar) -> Scalar:
-        """Torque on the joint [N m] at its angle [rad] and rate [rad/s]."""
-
     def __check_init__(self):
-        joint_index(self.location, self.name)
+        if self.place in ("tip", "base"):
+            if self.location != self.place:
+                raise ValueError(
+                    f"effect {self.name!r}: location must be {self.place!r}, not {self.location!r}."
+                )
+        elif self.place != "channel":
+            numbered(self.location, "link" if self.place == "link" else "joint", self.name)
 
     @property
-    def joint(self) -> int:
-        """Index of the joint that the effect acts on, counted from zero."""
-        return joint_index(self.location, self.name)
+    def index(self) -> int:
+        """Index of the joint or link that the effect acts on, counted from zero."""
+        return numbered(self.location, "link" if self.place == "link" else "joint", self.name)
 
 
-def joint_index(location: str, name: str) -> int:
-    """Index of the joint named by `location`; raises `ValueError` for anything else."""
+class AbstractJointEffect(AbstractEffect):
+    """A torque that a joint feels beside its motor."""
+
+    @abstractmethod
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+        """Torque on the joint [N m] at its angle [rad], its rate [rad/s] and time [s]."""
+
+
+class AbstractDriveEffect(AbstractEffect):
+    """Something between a command and its torque: in the amplifier, the winding or the magnets."""
+
+    @abstractmethod
+    def initial(self) -> PyTree:
+        """Memory at the start, a pytree of scalars; None for an effect without."""
+
+    @abstractmethod
+    def command(self, command: Scalar, memory: PyTree) -> Scalar:
+        """What reaches the motor of a command [V], [A] or [N m]."""
+
+    @abstractmethod
+    def motor(self, motor: Any, memory: PyTree) -> Any:
+        """The `DCMotor` as it is now."""
+
+    @abstractmethod
+    def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
+        """Time derivative of the memory."""
+
+
+class AbstractBodyEffect(AbstractEffect):
+    """A change of the arm itself: a part that is heavier, softer or rougher than was said."""
+
+    @abstractmethod
+    def apply(self, arm: Any) -> Any:
+        """The `Arm` with the effect in it."""
+
+
+class AbstractSensorEffect(AbstractEffect):
+    """A fault of an instrument: what it shows in place of the truth."""
+
+    @abstractmethod
+    def read(self, times: Float[Array, " times"], signal: Float[Array, " times"]) -> Float[Array, " times"]:
+        """What the instrument shows of `signal` at `times` [s]."""
+
+
+def numbered(location: str, part: str, name: str) -> int:
+    """Index of the `part` named by `location`; raises `ValueError` for anything else."""
     place, _, number = location.partition("_")
-    if place != "joint" or not number.isdigit() or int(number) < 1:
+    if place != part or not number.isdigit() or int(number) < 1:
         raise ValueError(
-            f"effect {name!r} acts at a joint: location must be joint_1, joint_2 …, not {location!r}."
+            f"effect {name!r} acts at a {part}: location must be {part}_1, {part}_2 …, not {location!r}."
         )
     return int(number) - 1

@@ -23,29 +23,41 @@ class CoulombFriction(AbstractJointEffect):
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "coulomb_friction"
+    place: ClassVar[str] = "joint"
+    units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s"}
+    looks_like: ClassVar[str] = "a torque that jumps as the joint changes direction and is flat in between"
 
-    def __call__(self, angle: Scalar, rate: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-T_c tanh(rate / v_t)` [N m]."""
         return -self.torque * smooth_sign(rate, self.transition_rate)
 
 
 class StribeckFriction(AbstractJointEffect):
-    """Friction that is higher near rest, `-T_s exp(-(rate/v_s)^2) sign(rate)`.
+    """Dry friction that is higher near rest, `-(T_c + T_s exp(-(rate/v_s)^2)) sign(rate)`.
 
-    `torque` T_s [N m] is the excess of breakaway over Coulomb friction, `stribeck_rate`
-    v_s [rad/s] where it fades; add a `CoulombFriction` for the level it fades to.
+    `torque` T_s [N m] is the excess of breakaway over the `level` T_c [N m] that it fades
+    to, `stribeck_rate` v_s [rad/s] where it fades.
     """
 
     torque: Scalar = eqx.field(converter=scalar)
+    level: Scalar = eqx.field(converter=scalar, default=0.0)
     stribeck_rate: Scalar = eqx.field(converter=scalar, default=0.1)
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "stribeck_friction"
+    place: ClassVar[str] = "joint"
+    units: ClassVar[dict[str, str]] = {
+        "torque": "N m",
+        "level": "N m",
+        "stribeck_rate": "rad/s",
+        "transition_rate": "rad/s",
+    }
+    looks_like: ClassVar[str] = "a torque against motion that peaks near rest and fades with speed"
 
-    def __call__(self, angle: Scalar, rate: Scalar) -> Scalar:
-        """`-T_s exp(-(rate / v_s)^2) tanh(rate / v_t)` [N m]."""
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+        """`-(T_c + T_s exp(-(rate / v_s)^2)) tanh(rate / v_t)` [N m]."""
         fade = jnp.exp(-((rate / self.stribeck_rate) ** 2))
-        return -self.torque * fade * smooth_sign(rate, self.transition_rate)
+        return -(self.level + self.torque * fade) * smooth_sign(rate, self.transition_rate)
 
 
 class AsymmetricFriction(AbstractJointEffect):
@@ -59,8 +71,11 @@ class AsymmetricFriction(AbstractJointEffect):
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "asymmetric_friction"
+    place: ClassVar[str] = "joint"
+    units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s"}
+    looks_like: ClassVar[str] = "a torque of one sign while the joint turns either way, gone at rest"
 
-    def __call__(self, angle: Scalar, rate: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-T_a tanh(rate / v_t)^2` [N m]."""
         return -self.torque * smooth_sign(rate, self.transition_rate) ** 2
 
@@ -71,7 +86,10 @@ class QuadraticDrag(AbstractJointEffect):
     coefficient: Scalar = eqx.field(converter=scalar)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "quadratic_drag"
+    place: ClassVar[str] = "joint"
+    units: ClassVar[dict[str, str]] = {"coefficient": "N m s^2/rad^2"}
+    looks_like: ClassVar[str] = "a torque against motion that is a straight line over speed times its size"
 
-    def __call__(self, angle: Scalar, rate: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-c rate |rate|` [N m]."""
         return -self.coefficient * rate * jnp.abs(rate)

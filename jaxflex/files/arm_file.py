@@ -9,8 +9,9 @@ from typing import Any
 from ..arm.arm import DRIVES, Arm
 from ..arm.parts import Joint, Link, Payload
 from ..beam.basis import MODE_SHAPES
-from ..effects import EFFECTS, AbstractJointEffect
+from ..effects import EFFECTS, AbstractEffect
 from ..motor import DCMotor
+from ..sensors import UNITS
 from .fields import ArmFileError, Fields
 
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
@@ -22,13 +23,16 @@ class ArmFile:
     """What an arm file says: the `arm`, and the relative standard deviation of its parameters.
 
     `uncertainty` maps parameter names to relative standard deviations; the key
-    `"default"` stands for all others. `design` is the `[design]` table that `tune`
-    writes beside an arm, or None.
+    `"default"` stands for all others. `sections` says of each link what its section was
+    given as (`width`, `thickness`, `youngs_modulus`, `density`), or None where
+    `mass_per_length` and `flexural_rigidity` were. `design` is the `[design]` table that
+    `tune` writes beside an arm, or None.
     """
 
     arm: Arm
     uncertainty: dict[str, float]
     design: dict[str, Any] | None
+    sections: tuple[dict[str, float] | None, ...] = ()
 
 
 def load_arm(path: str | Path) -> Arm:
@@ -60,7 +64,13 @@ def parse_arm(table: dict[str, Any], file: str = "arm") -> ArmFile:
     if not isinstance(name, str):
         raise top.fail("name", f"found {name!r}; text in quotes is allowed.")
     gravity = top.number("gravity", 0.0, "a number", lambda x: True)
-    links = tuple(_link(Fields(part, f"link {i}: ", file)) for i, part in enumerate(_tables(top, "link"), 1))
+    side = top.number("side_gravity", None, "a number", lambda x: True)
+    tables = _tables(top, "link")
+    links = tuple(_link(Fields(part, f"link {i}: ", file)) for i, part in enumerate(tables, 1))
+    sections = tuple(
+        {key: float(part[key]) for key in SECTION_KEYS} if "youngs_modulus" in part else None
+        for part in tables
+    )
     joints = tuple(
         _joint(Fields(part, f"joint {i}: ", file), file, i) for i, part in enumerate(_tables(top, "joint"), 1)
     )
@@ -94,7 +104,7 @@ def parse_arm(table: dict[str, Any], file: str = "arm") -> ArmFile:
                 "positive hub_inertia or rotor_inertia."
             )
     effects = tuple(
-        _effect(Fields(part, f"effect {i}: ", file), len(joints))
+        _effect(Fields(part, f"effect {i}: ", file), links, joints)
         for i, part in enumerate(_tables(top, "effect"), 1)
     )
     uncertainty = _uncertainty(Fields(top.take("uncertainty", {}), "uncertainty: ", file))
@@ -102,8 +112,8 @@ def parse_arm(table: dict[str, Any], file: str = "arm") -> ArmFile:
     if design is not None and not isinstance(design, dict):
         raise top.fail("design", f"found {design!r}; a table is needed.")
     top.finish()
-    arm = Arm(links, joints, payload, gravity or None, drive, effects, name)
-    return ArmFile(arm, uncertainty, design)
+    arm = Arm(links, joints, payload, gravity or None, drive, effects, name, side)
+    return ArmFile(arm, uncertainty, design, sections)
 
 
 def _tables(top: Fields, key: str) -> list:
@@ -131,6 +141,8 @@ def _link(fields: Fields) -> Link:
             "gauge_position", 0.0, "a number from 0 to the length", lambda x: 0 <= x <= (length or 0)
         ),
         root_stiffness=fields.not_negative("root_stiffness"),
+        root_compliance=fields.not_negative("root_compliance"),
+        shortening=fields.not_negative("shortening", None),
     )
     by_section = any(fields.has(key) for key in ("width", "youngs_modulus", "density"))
     if by_section and any(fields.has(key) for key in DIRECT_KEYS):
@@ -175,8 +187,13 @@ def _joint(fields: Fields, file: str, number: int) -> Joint:
         hub_mass=fields.not_negative("hub_mass"),
         viscous_friction=fields.not_negative("viscous_friction"),
         rotor_inertia=fields.not_negative("rotor_inertia"),
+        compliance=fields.not_negative("compliance"),
+        play=fields.not_negative("play", None),
+        contact_stiffness=fields.number("contact_stiffness"),
         motor=None if motor is None else _motor(Fields(motor, f"joint {number}: motor: ", file)),
     )
+    if joint.play is not None and joint.contact_stiffness is None:
+        raise fields.fail("contact_stiffness", "missing; a joint with play needs a positive number.")
     fields.finish()
     return joint
 
@@ -196,10 +213,10 @@ def _motor(fields: Fields) -> DCMotor:
     return motor
 
 
-def _effect(fields: Fields, joints: int) -> AbstractJointEffect:
+def _effect(fields: Fields, links: tuple, joints: tuple) -> AbstractEffect:
     name = fields.choice("name", "", list(EFFECTS))
-    location = fields.choice("location", "", [f"joint_{i + 1}" for i in range(joints)])
     kind = EFFECTS[name]
+    location = fields.choice("location", "", places(kind, links, joints))
     values = {}
     for part in dataclasses.fields(kind):
         if part.name == "location":
@@ -210,6 +227,20 @@ def _effect(fields: Fields, joints: int) -> AbstractJointEffect:
             values[part.name] = value
     fields.finish()
     return kind(location=location, **values)
+
+
+def places(kind: type[AbstractEffect], links: tuple, joints: tuple) -> list[str]:
+    """Every location that an effect of this kind may have on an arm of these parts."""
+    if kind.place in ("tip", "base"):
+        return [kind.place]
+    if kind.place == "link":
+        return [f"link_{i}" for i in range(1, len(links) + 1)]
+    if kind.place == "channel":
+        numbered = [name for name in UNITS if name not in ("time", "tip_x", "tip_y")]
+        return [f"{name}_{i}" for name in numbered for i in range(1, len(joints) + 1)] + ["tip_x", "tip_y"]
+    return [
+        f"joint_{i}" for i, joint in enumerate(joints, 1) if kind.place == "joint" or joint.motor is not None
+    ]
 
 
 def _uncertainty(fields: Fields) -> dict[str, float]:
@@ -234,6 +265,8 @@ def save_arm(
     """
     lines = [f"name = {_toml(arm.name)}"]
     lines.append(f"gravity = {_toml(0.0 if arm.gravity is None else arm.gravity)}")
+    if arm.side_gravity is not None:
+        lines.append(f"side_gravity = {_toml(arm.side_gravity)}")
     for link in arm.links:
         lines += ["", "[[link]]", *_pairs(link, ("damping_ratio",))]
         ratios = link.damping_ratio

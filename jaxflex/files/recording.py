@@ -1,31 +1,19 @@
-"""Recordings: CSV with a header of `channel [unit]`, checked and converted to SI."""
+"""Recordings: measured channels over time, their sample time, gaps and resampling."""
 
-import csv
-import math
-import re
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from ..sensors import unit
+GAP = 5.0
+"""Steps of time longer than this many sample times are gaps."""
 
-_PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "c": 1e-2, "n": 1e-9}
-_BASES = ("s", "V", "A", "N m", "rad", "rad/s", "m", "m/s^2")
-_SPECIAL = {
-    "deg": ("rad", math.pi / 180),
-    "deg/s": ("rad/s", math.pi / 180),
-    "rpm": ("rad/s", 2 * math.pi / 60),
-    "g": ("m/s^2", 9.80665),
-    "%": ("1", 1e-2),
-    "1": ("1", 1.0),
-    "": ("1", 1.0),
-    "ustrain": ("1", 1e-6),
-    "µε": ("1", 1e-6),
-    "mm/s^2": ("m/s^2", 1e-3),
-    "min": ("s", 60.0),
-}
-_HEADER = re.compile(r"^\s*([A-Za-z]\w*)\s*\[\s*([^\]]*?)\s*\]\s*$")
+HELD = ("voltage_", "torque_")
+"""Channels, by how their names begin, that a digital controller holds from sample to sample."""
+
+_JITTER = 0.02
+"""Steps of time that differ by less than this share count as equal."""
 
 
 class RecordingError(ValueError):
@@ -34,86 +22,124 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True)
 class Recording:
-    """Measured channels in SI units at `times` [s]; `repairs` says what was mended on reading."""
+    """Measured `channels` in SI units at rising `times` [s].
+
+    `repairs` says what was mended and what was noticed; `source` is the file or another name for
+    messages. Nothing here changes a recording: every method gives a new one.
+    """
 
     times: np.ndarray
-    channels: dict[str, np.ndarray]
-    repairs: tuple[str, ...]
+    channels: Mapping[str, np.ndarray]
+    repairs: tuple[str, ...] = ()
+    source: str = "recording"
+
+    def __post_init__(self) -> None:
+        for name, values in self.channels.items():
+            if np.shape(values) != self.times.shape:
+                raise RecordingError(
+                    f"{self.source}: {name}: found shape {np.shape(values)}, times has {self.times.shape}."
+                )
+        if len(self) < 2:
+            raise RecordingError(f"{self.source}: {len(self)} complete row(s); at least two are needed.")
+        if not np.all(np.diff(self.times) > 0):
+            raise RecordingError(f"{self.source}: time does not rise; samples must be in order of time.")
+
+    def __len__(self) -> int:
+        return len(self.times)
 
     def __getitem__(self, channel: str) -> np.ndarray:
         if channel not in self.channels:
             raise KeyError(f"no channel {channel!r}; there are {', '.join(self.channels)}.")
         return self.channels[channel]
 
+    @property
+    def sample_time(self) -> float:
+        """Typical step of time [s]: the mean of all steps but those over lost rows."""
+        steps = np.diff(self.times)
+        return float(np.mean(steps[steps <= 1.5 * np.median(steps)]))
 
-def factor(given: str, wanted: str) -> float | None:
-    """What a value in unit `given` is multiplied by to be in SI unit `wanted`; None if it cannot be."""
-    if given in _SPECIAL:
-        base, scale = _SPECIAL[given]
-        return scale if base == wanted else None
-    for base in sorted(_BASES, key=len, reverse=True):
-        if base == wanted and given.endswith(base):
-            return _PREFIXES.get(given[: len(given) - len(base)].strip())
-    return None
+    @property
+    def uniform(self) -> bool:
+        """True if every step is the sample time, to 2 % and to the rounding of times to their digits."""
+        step, digit = self.sample_time, _last_digit(self.times)
+        rounding = 1.01 * digit if digit <= step / 4 else 0.0
+        return bool(np.all(np.abs(np.diff(self.times) - step) <= _JITTER * step + rounding))
 
+    def gaps(self) -> np.ndarray:
+        """Indices of the samples after which time jumps by more than `GAP` sample times."""
+        return np.flatnonzero(np.diff(self.times) > GAP * self.sample_time)
 
-def read_recording(path: str | Path) -> Recording:
-    """Read the CSV at `path`.
+    def noting(self, *repairs: str) -> "Recording":
+        """The same with more `repairs` said."""
+        return replace(self, repairs=(*self.repairs, *repairs))
 
-    Rows that hold a NaN or an empty cell are left out and reported in `repairs`.
+    def window(self, start: int, stop: int) -> "Recording":
+        """Samples `start` up to, not including, `stop`."""
+        channels = {name: values[start:stop] for name, values in self.channels.items()}
+        return replace(self, times=self.times[start:stop], channels=channels)
 
-    **Raises** `RecordingError` for a file that cannot be read, a header that is not
-    `channel [unit]`, a unit that does not fit, time that does not rise, or fewer than
-    two rows.
-    """
-    file = str(path)
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{file}: cannot be read: {error}.") from error
-    if not rows:
-        raise RecordingError(f"{file}: empty; a header of 'channel [unit]' and rows are needed.")
-    names, scales = [], []
-    for column in rows[0]:
-        match = _HEADER.match(column)
-        if match is None:
-            raise RecordingError(f"{file}: column {column!r}: a header such as 'angle_1 [rad]' is needed.")
-        name, given = match.groups()
-        try:
-            wanted = unit(name)
-        except KeyError:
+    def split_at_gaps(self) -> list["Recording"]:
+        """The pieces between gaps, in order; a lone sample between two gaps is none."""
+        edges = [0, *(self.gaps() + 1).tolist(), len(self)]
+        return [self.window(a, b) for a, b in pairwise(edges) if b - a >= 2]
+
+    def to_uniform(
+        self, sample_time: float | None = None, held: Collection[str] | None = None
+    ) -> "Recording":
+        """The same motion at equal steps of `sample_time` [s] (default: its own).
+
+        Channels in `held` (default: every voltage and torque) stay at a value until the next
+        sample, as a digital controller's output does; each new value is their mean over the step
+        that it stands for, so that a coarser step keeps the impulse. All others are read off the
+        straight line between samples: what a simulation gives at the same instants compares with
+        them as it stands.
+
+        **Raises** `RecordingError` if there are gaps; see `split_at_gaps`.
+        """
+        if len(self.gaps()):
+            at = self.times[self.gaps()[0]]
+            raise RecordingError(f"{self.source}: time jumps after {at:.6g} s; split_at_gaps() comes first.")
+        own = self.sample_time
+        step = own if sample_time is None else sample_time
+        if self.uniform:
+            times = np.linspace(self.times[0], self.times[-1], len(self))
+            if abs(step - own) <= 1e-6 * own:
+                return replace(self, times=times)
+        else:
+            times = self.times
+        count = int((times[-1] - times[0]) / step * (1 + 1e-9)) + 1
+        if count < 2:
             raise RecordingError(
-                f"{file}: column {column!r}: unknown channel; see the recording format."
-            ) from None
-        scale = factor(given, wanted)
-        if scale is None:
-            raise RecordingError(f"{file}: column {column!r}: unit [{given}] is not one of [{wanted}].")
-        names.append(name)
-        scales.append(scale)
-    if names[0] != "time":
-        raise RecordingError(f"{file}: first column {rows[0][0]!r}: 'time [s]' is needed.")
-    if len(set(names)) != len(names):
-        raise RecordingError(f"{file}: a channel is given twice; each must be there once.")
-    values = np.full((len(rows) - 1, len(names)), np.nan)
-    for i, row in enumerate(rows[1:]):
-        if len(row) != len(names):
-            raise RecordingError(f"{file}: row {i + 2}: found {len(row)} cells, the header has {len(names)}.")
-        for j, cell in enumerate(row):
-            if cell.strip():
-                try:
-                    values[i, j] = float(cell)
-                except ValueError:
-                    raise RecordingError(f"{file}: row {i + 2}, {names[j]}: {cell!r} is no number.") from None
-    values = values * np.asarray(scales)
-    whole = np.asarray(np.isfinite(values).all(axis=1))
-    repairs = ()
-    if not whole.all():
-        repairs = (f"{int((~whole).sum())} of {len(whole)} rows hold a gap or NaN and were left out",)
-        values = values[whole]
-    if len(values) < 2:
-        raise RecordingError(f"{file}: {len(values)} complete row(s); at least two are needed.")
-    if not (np.diff(values[:, 0]) > 0).all():
-        row = int(np.argmin(np.diff(values[:, 0]))) + 3
-        raise RecordingError(f"{file}: time does not rise at row {row}; rows must be in order of time.")
-    return Recording(values[:, 0], {n: values[:, j] for j, n in enumerate(names) if j}, repairs)
+                f"{self.source}: found {times[-1] - times[0]:.4g} s of data; "
+                f"a sample time of {step:.4g} s leaves {count} sample(s)."
+            )
+        grid = times[0] + step * np.arange(count)
+        if held is None:
+            held = [name for name in self.channels if name.startswith(HELD)]
+        channels = {
+            name: _mean_of_held(times, values, grid, step) if name in held else np.interp(grid, times, values)
+            for name, values in self.channels.items()
+        }
+        longest = np.max(np.diff(self.times))
+        note = f"resampled from {len(self)} samples to {count} at equal steps of {step:.6g} s"
+        if not self.uniform:
+            note += f" (steps were up to {longest:.6g} s)"
+        return Recording(grid, channels, (*self.repairs, note), self.source)
+
+
+def _mean_of_held(times: np.ndarray, values: np.ndarray, grid: np.ndarray, step: float) -> np.ndarray:
+    """Mean over `[t, t + step]`, t in `grid`, of what holds each of `values` until the next of `times`."""
+    edges = np.append(times, max(times[-1], grid[-1]) + step)
+    # deviations from the first value: the running integral then loses no digits to a large offset
+    integral = np.concatenate([[0.0], np.cumsum((values - values[0]) * np.diff(edges))])
+    ends = np.interp(np.append(grid, grid[-1] + step), edges, integral)
+    return values[0] + np.diff(ends) / step
+
+
+def _last_digit(times: np.ndarray) -> float:
+    """Unit of the last decimal [s] that `times` are given in; 0 beyond a nanosecond."""
+    for digits in range(10):
+        scaled = times * 10.0**digits
+        if np.max(np.abs(scaled - np.round(scaled))) < 1e-3:
+            return 10.0**-digits
+    return 0.0

@@ -9,10 +9,18 @@ from jaxtyping import PyTree
 
 from ..arm.arm import AssembledArm
 from ..control import AbstractController, AbstractReference, Measurement
-from ..drive import DriveState, drive, effect_torques, initial_currents
+from ..drive import (
+    DriveState,
+    drive,
+    drive_memory_rates,
+    effect_torques,
+    initial_currents,
+    initial_drive_memory,
+)
 from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
 from ..scalars import Scalar, dot
+from ..sensors import measured_deflection
 
 
 class State(NamedTuple):
@@ -20,7 +28,7 @@ class State(NamedTuple):
 
     `q` coordinates [rad], [m]; `qd` their rates; `current` [A] of the motors whose
     current is a state; `memory` of the controller; `held` command under sampled
-    control. What there is none of is None.
+    control; `drive`: memory of the drive effects. What there is none of is None.
     """
 
     q: tuple
@@ -28,6 +36,7 @@ class State(NamedTuple):
     current: tuple | None
     memory: PyTree
     held: tuple | None
+    drive: tuple | None = None
 
 
 class Plant(eqx.Module):
@@ -45,7 +54,12 @@ class Plant(eqx.Module):
         q = angles + (zero,) * (self.model.size - len(angles))
         held = None if self.sample_time is None else (zero,) * len(angles)
         return State(
-            q, (zero,) * len(q), initial_currents(self.model) or None, self.controller.initial(), held
+            q,
+            (zero,) * len(q),
+            initial_currents(self.model) or None,
+            self.controller.initial(),
+            held,
+            initial_drive_memory(self.model),
         )
 
     def measurement(self, state: State) -> Measurement:
@@ -59,7 +73,7 @@ class Plant(eqx.Module):
             angle=angles,
             rate=rates,
             current=currents,
-            tip_deflection=tuple(map(lambda m, e: dot(m.tip_deflection, e), links, etas)),
+            tip_deflection=tuple(map(measured_deflection, links, etas)),
             curvature=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, etas)),
             curvature_rate=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, eta_rates)),
         )
@@ -73,13 +87,13 @@ class Plant(eqx.Module):
         """What the drives do at `t`, under the held command where control is sampled."""
         command = self.command(t, state) if state.held is None else state.held
         rates, _ = self.model.split(state.qd)
-        return drive(self.model, command, state.current or (), rates)
+        return drive(self.model, command, state.current or (), rates, state.drive)
 
     def accelerations(self, t: Scalar, state: State, drives: DriveState) -> tuple:
         """`q''` of `M q'' + C q' + g + D q' = tau` (Ahmad et al. (27))."""
         angles, _ = self.model.split(state.q)
         rates, _ = self.model.split(state.qd)
-        extra = effect_torques(self.model, angles, rates)
+        extra = effect_torques(self.model, angles, rates, t)
         torques = tuple(map(lambda a, b: a + b, drives.torque, extra))
         if self.disturbance is not None:
             torques = tuple(map(lambda a, b: a + b, torques, self.disturbance(t)))
@@ -99,7 +113,11 @@ class Plant(eqx.Module):
         else:
             memory = jtu.tree_map(jnp.zeros_like, state.memory)
         held = None if state.held is None else tuple(jnp.zeros_like(h) for h in state.held)
-        return State(state.qd, qdd, drives.current_rate or None, memory, held)
+        command = state.held
+        if command is None and state.drive is not None:
+            command = self.command(t, state)
+        kept = drive_memory_rates(self.model, command or (), drives, state.drive)
+        return State(state.qd, qdd, drives.current_rate or None, memory, held, kept)
 
     def sampled(self, t: Scalar, state: State) -> State:
         """The state just after a sample at `t`: command held anew, memory advanced one period."""

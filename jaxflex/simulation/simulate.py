@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference
+from ..effects import AbstractSensorEffect
 from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
@@ -212,4 +213,7 @@ def _integrate(
         return state, {name: channels[name] for name in wanted}
 
     states, channels = jax.vmap(read)(times, states)
+    for effect in plant.model.arm.effects:
+        if isinstance(effect, AbstractSensorEffect) and effect.location in channels:
+            channels[effect.location] = effect.read(times, channels[effect.location])
     return Trajectory(times, channels, states, status, steps, rejected)

@@ -73,7 +73,7 @@ def test_one_way_ode_and_voltage_transfer():
     axis = jf.MotorAxis(jf.DCMotor(1.2, 0.062, 0.062, inductance=1.5e-3), 3e-4, 2e-4)
     link = jf.Link(0.395, 0.149, 0.7, damping_ratio=0.01, modes=2, mode_shapes="clamped_free")
     arm = jf.Arm((link,), (jf.Joint(hub_inertia=1.0),))
-    model = link.discretise(arm.distal(0), False)
+    model = link.discretise(arm.distal(0), False, jf.Joint())
     one_way = jf.OneWayLink(model)
     s = jnp.array([30.0j])
     np.testing.assert_allclose(

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxflex import MODE_SHAPES, Link, ahmad_arm, driven_frequencies, foldager_link, locked_frequencies
+from jaxflex import MODE_SHAPES, Joint, Link, ahmad_arm, driven_frequencies, foldager_link, locked_frequencies
 from jaxflex.beam.basis import Distal
 from tests.finite_element import frame_frequencies
 
@@ -51,7 +51,7 @@ def test_shapes_are_tangent_orthogonal_and_scaled(kind):
     bend = jax.vmap(basis.curvature)(jnp.asarray(points))
     stiffness = 2.0 * np.einsum("p,pi,pj->ij", weights, bend, bend)
     np.testing.assert_allclose(stiffness - np.diag(np.diag(stiffness)), 0.0, atol=1e-8 * stiffness.max())
-    model = link.discretise(distal, True)
+    model = link.discretise(distal, True, Joint())
     np.testing.assert_allclose(model.stiffness, np.diag(stiffness), rtol=1e-9)
     slope = jax.jacfwd(basis.deflection)(jnp.asarray(0.4))
     np.testing.assert_allclose(slope, basis.slope(jnp.asarray(0.4)), rtol=1e-9)

@@ -1,0 +1,1 @@
+"""Where a model and its recordings disagree, and what is missing."""

@@ -1,0 +1,204 @@
+"""Every effect that an arm could be missing, each absent, and how a small one would show.
+
+An effect enters the screening as columns: slopes of all readings by its amplitudes. A
+torque, or a voltage, that depends on the motion is a column of forces along the motion
+that the model predicts; all others are slopes by a parameter of the arm.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..arm.arm import Arm
+from ..drive import has_current_state
+from ..effects import EFFECTS, AbstractEffect, AbstractJointEffect
+from ..files.arm_file import places
+from .parameters import Parameters
+
+ORDERS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18, 20, 24)  # of cogging, periods a turn
+STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
+SATURATION = (0.4, 0.55, 0.7, 0.85)  # of the largest command
+COOLING = (0.0, 10.0)  # s
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing, in one of the shapes that are tried.
+
+    `amplitudes`: its parameters that enter linearly; `shape`: values of the others;
+    `free`: shape parameters that a full fit may move.
+    """
+
+    effect: str
+    location: str
+    amplitudes: tuple[str, ...]
+    shape: tuple[tuple[str, float], ...] = ()
+    free: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Effect and location: what a report names."""
+        return self.effect, self.location
+
+
+def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float]) -> list[AbstractEffect]:
+    """One absent effect of every kind at every place that this arm has."""
+    found = []
+    for kind in EFFECTS.values():
+        for location in places(kind, arm.links, arm.joints):
+            if not _possible(kind.name, location, arm, channels):
+                continue
+            options = {}
+            if "transition_rate" in kind.units:
+                options["transition_rate"] = transition_rates[int(location.rpartition("_")[2]) - 1]
+            found.append(kind(0.0, location=location, **options))
+    return found
+
+
+def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> bool:
+    if name == "backlash":
+        return False  # it changes the number of states; see `Candidate`s of its own
+    if name in ("voltage_saturation", "voltage_dead_zone", "winding_heating"):
+        return arm.drive == "voltage"
+    if name == "torque_constant":
+        return arm.drive != "torque"
+    if name in ("payload_mass", "gravity"):
+        return bool(arm.links)
+    if name in ("root_compliance", "structural_damping", "centrifugal_stiffening"):
+        return arm.links[int(location.rpartition("_")[2]) - 1].modes > 0
+    if name == "joint_flexibility":
+        joint = int(location.rpartition("_")[2]) - 1
+        return joint < len(arm.links) and arm.links[joint].modes > 0
+    if name.startswith("sensor_"):
+        return location in channels
+    return True
+
+
+def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float]) -> Iterator[Candidate]:
+    """Every candidate for a motion; `frequencies` [Hz] are those worth trying for a disturbance."""
+    for effect in parameters.effects:
+        name, location = effect.name, effect.location
+        if name == "stribeck_friction":
+            for share in STRIBECK:
+                rate = share * motion.rms_rate(effect.index)
+                yield Candidate(name, location, ("torque", "level"), (("stribeck_rate", rate),), ("stribeck_rate",))
+        elif name == "cogging_torque":
+            for order in ORDERS:
+                yield Candidate(name, location, ("sine", "cosine"), (("order", float(order)),), ("order",))
+        elif name == "periodic_disturbance":
+            for f in frequencies:
+                yield Candidate(name, location, ("sine", "cosine"), (("frequency", f),), ("frequency",))
+        elif name == "voltage_saturation":
+            for share in SATURATION:
+                yield Candidate(name, location, (), (("limit", share * motion.largest_command(effect.index)),), ("limit",))
+        elif name == "torque_constant":
+            for share in (0.0, 1.0):
+                yield Candidate(name, location, ("change",), (("back_emf_share", share),))
+        elif name == "winding_heating":
+            for time in COOLING:
+                yield Candidate(name, location, ("coefficient",), (("cooling_time", time),))
+        elif name == "gravity":
+            yield Candidate(name, location, ("along_y", "along_x"))
+        elif name == "cable_stiffness":
+            yield Candidate(name, location, ("stiffness",))
+        else:
+            yield Candidate(name, location, (next(iter(effect.units)),))
+
+
+class Motion:
+    """The motion that a model predicts for a run, sample by sample and in between."""
+
+    def __init__(self, parameters: Parameters, states: np.ndarray, ends: np.ndarray, command: np.ndarray, dt: float):
+        self.parameters = parameters
+        arm = parameters.arm
+        self.model = arm.assemble()
+        self.command = command
+        self.dt = dt
+        following = np.concatenate([states[:, 1:], ends[:, None]], 1)
+        weights = np.array([0.125, 0.375, 0.625, 0.875])
+        # (points, pieces, samples, states): within each interval, along a straight line
+        self.between = states + weights[:, None, None, None] * (following - states)
+
+    def angle(self, joint: int) -> np.ndarray:
+        """Angle [rad] within each interval."""
+        return self.between[..., joint]
+
+    def rate(self, joint: int) -> np.ndarray:
+        """Rate [rad/s] within each interval."""
+        return self.between[..., self.model.size + joint]
+
+    def current(self, joint: int) -> np.ndarray:
+        """Current [A] within each interval."""
+        arm, n = self.parameters.arm, self.model.size
+        before = sum(has_current_state(self.model, i) for i in range(joint))
+        if has_current_state(self.model, joint):
+            return self.between[..., 2 * n + before]
+        if arm.drive == "current":
+            return np.broadcast_to(self.command[..., joint], self.rate(joint).shape)
+        motor = arm.joints[joint].motor
+        emf = float(motor.back_emf_constant * motor.gear_ratio) * self.rate(joint)
+        return (self.command[..., joint] - emf) / float(motor.resistance)
+
+    def rms_rate(self, joint: int) -> float:
+        """Root mean square of the joint's rate [rad/s]."""
+        return float(np.sqrt(np.mean(self.rate(joint) ** 2)))
+
+    def largest_command(self, joint: int) -> float:
+        """Largest command of the joint."""
+        return float(np.abs(self.command[..., joint]).max())
+
+    def heat(self, joint: int, cooling: float) -> np.ndarray:
+        """Heat [J] in the winding since the start of the run."""
+        motor = self.parameters.arm.joints[joint].motor
+        power = float(motor.resistance) * (self.current(joint) ** 2).mean(0).ravel()
+        keep = np.exp(-self.dt / cooling) if cooling > 0 else 1.0
+        found = np.zeros_like(power)
+        for k in range(1, len(power)):
+            found[k] = keep * found[k - 1] + power[k - 1] * self.dt
+        return found.reshape(self.command.shape[:2])
+
+    def forcing(self, candidate: Candidate, time: np.ndarray) -> np.ndarray | None:
+        """Columns of commands and forces, one an amplitude, or None for slopes by a parameter."""
+        kind = EFFECTS[candidate.effect]
+        if candidate.location.rpartition("_")[0] != "joint":
+            return None
+        joint = int(candidate.location.rpartition("_")[2]) - 1
+        joints = self.command.shape[2]
+        blank = np.zeros((*self.command.shape[:2], joints + self.model.size))
+        shape = dict(candidate.shape)
+        if issubclass(kind, AbstractJointEffect):
+            base = next(e for e in self.parameters.effects if (e.name, e.location) == candidate.key)
+            columns = []
+            for amplitude in candidate.amplitudes:
+                options = {f: getattr(base, f) for f in kind.units} | shape
+                options |= dict.fromkeys(candidate.amplitudes, 0.0) | {amplitude: 1.0}
+                effect = kind(location=candidate.location, **options)
+                at = jnp.asarray(time + self.dt / 2)
+                torque = jax.vmap(lambda a, r, e=effect, at=at: e(a, r, at))(
+                    jnp.asarray(self.angle(joint)), jnp.asarray(self.rate(joint))
+                )
+                column = blank.copy()
+                column[..., joints + joint] = np.asarray(torque).mean(0)
+                columns.append(column)
+            return np.stack(columns)
+        command = self.command[..., joint]
+        column = blank.copy()
+        if candidate.effect == "voltage_dead_zone":
+            column[..., joint] = -np.sign(command)
+        elif candidate.effect == "voltage_saturation":
+            column[..., joint] = np.clip(command, -shape["limit"], shape["limit"]) - command
+        elif candidate.effect == "winding_heating":
+            motor = self.parameters.arm.joints[joint].motor
+            drop = float(motor.resistance) * self.current(joint).mean(0)
+            column[..., joint] = -drop * self.heat(joint, shape["cooling_time"])
+        elif candidate.effect == "torque_constant":
+            motor = self.parameters.arm.joints[joint].motor
+            per = float(motor.gear_ratio)
+            column[..., joints + joint] = float(motor.efficiency) * per * self.current(joint).mean(0)
+            column[..., joint] = -shape["back_emf_share"] * per * self.rate(joint).mean(0)
+        else:
+            return None
+        return column[None]

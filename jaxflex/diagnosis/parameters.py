@@ -1,0 +1,175 @@
+"""Every number the diagnosis may move: the arm's nominal parameters, and each effect at zero.
+
+All effects of the catalogue sit in one arm from the start, absent until a parameter of
+theirs is raised. One structure then serves every hypothesis, and is compiled once.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..arm.arm import Arm
+from ..effects import AbstractEffect, AbstractSensorEffect, InputDelay
+from ..files.arm_file import ArmFile
+
+# what these do is done to the command and to the readings, not inside the arm
+OUTSIDE = (InputDelay, AbstractSensorEffect)
+
+DEFAULT_UNCERTAINTY = 0.05  # relative, where an arm file says nothing
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A nominal parameter: its value is `value exp(spread z)`, with z of unit variance a priori.
+
+    `leaves` of the arm go with powers of it: `(path, power)`.
+    """
+
+    name: str
+    value: float
+    spread: float
+    leaves: tuple[tuple[Callable[[Any], Any], int], ...]
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """Parameter `field` of the effect at `index` in the arm (None: outside of it); `value` where absent."""
+
+    index: int | None
+    effect: str
+    location: str
+    field: str
+    unit: str
+    value: float
+
+    @property
+    def name(self) -> str:
+        """`coulomb_friction at joint_1: torque`."""
+        return f"{self.effect} at {self.location}: {self.field}"
+
+
+class Parameters:
+    """The vector that the diagnosis works on, and the arm it stands for.
+
+    `vector` holds z of every nominal parameter, then the value of every effect parameter.
+    """
+
+    def __init__(self, file: ArmFile, effects: Sequence[AbstractEffect]):
+        self.nominal = tuple(_nominal(file))
+        inside = [effect for effect in effects if not isinstance(effect, OUTSIDE)]
+        self.arm = dataclasses.replace(file.arm, effects=(*file.arm.effects, *inside))
+        places = {id(e): len(file.arm.effects) + i for i, e in enumerate(inside)}
+        self.effects = tuple(effects)
+        self.effect = tuple(
+            EffectParameter(
+                places.get(id(effect)), effect.name, effect.location, field, unit,
+                float(getattr(effect, field)),
+            )
+            for effect in effects
+            for field, unit in effect.units.items()
+        )  # fmt: skip
+        self.start = np.array([0.0] * len(self.nominal) + [part.value for part in self.effect])
+
+    @property
+    def names(self) -> list[str]:
+        """Name of every entry of the vector."""
+        return [part.name for part in (*self.nominal, *self.effect)]
+
+    def position(self, effect: str, location: str, field: str) -> int:
+        """Where in the vector a parameter of an effect is."""
+        for i, part in enumerate(self.effect):
+            if (part.effect, part.location, part.field) == (effect, location, field):
+                return len(self.nominal) + i
+        raise KeyError(f"no parameter {field!r} of {effect!r} at {location!r}.")
+
+    def build(self, vector: Float[Array, " parameters"]) -> Arm:
+        """The arm with the parameters of `vector`; differentiable."""
+        moved: dict[int, tuple[Callable[[Any], Any], Any]] = {}
+        for i, part in enumerate(self.nominal):
+            for path, power in part.leaves:
+                key = id(path(self.arm))
+                value = moved[key][1] if key in moved else path(self.arm)
+                moved[key] = (path, value * jnp.exp(power * part.spread * vector[i]))
+        for j, part in enumerate(self.effect):
+            if part.index is not None:
+                moved[-1 - j] = (_field(part.index, part.field), vector[len(self.nominal) + j])
+        paths = [path for path, _ in moved.values()]
+        return eqx.tree_at(
+            lambda a: [path(a) for path in paths], self.arm, [value for _, value in moved.values()]
+        )
+
+    def nominal_values(self, vector: np.ndarray) -> dict[str, float]:
+        """Values of the nominal parameters in SI units."""
+        return {
+            part.name: part.value * float(np.exp(part.spread * vector[i]))
+            for i, part in enumerate(self.nominal)
+        }
+
+
+def _field(index: int, field: str) -> Callable[[Any], Any]:
+    return lambda arm: getattr(arm.effects[index], field)
+
+
+def _nominal(file: ArmFile) -> list[Nominal]:
+    """The positive parameters of the arm with their uncertainty; those at zero are not there."""
+    arm, found = file.arm, []
+    default = file.uncertainty.get("default", DEFAULT_UNCERTAINTY)
+
+    def add(name, keys, value, leaves):
+        spread = next((file.uncertainty[key] for key in keys if key in file.uncertainty), default)
+        if value is not None and float(value) > 0 and spread > 0:
+            found.append(Nominal(name, float(value), spread, tuple(leaves)))
+
+    for i, link in enumerate(arm.links):
+        tail = f"_{i + 1}" if len(arm.links) > 1 else ""
+
+        def at(field, i=i):
+            return lambda a: getattr(a.links[i], field)
+
+        add(f"length{tail}", ["length"], link.length, [(at("length"), 1)])
+        section = file.sections[i] if i < len(file.sections) else None
+        mass, bend = at("mass_per_length"), at("flexural_rigidity")
+        if section is not None:
+            powers = {
+                "width": [(mass, 1), (bend, 1)],
+                "thickness": [(mass, 1), (bend, 3), (at("thickness"), 1)],
+                "youngs_modulus": [(bend, 1)],
+                "density": [(mass, 1)],
+            }
+            for key, leaves in powers.items():
+                add(key + tail, [key], section[key], leaves)
+        else:
+            add(f"mass_per_length{tail}", ["mass_per_length"], link.mass_per_length, [(mass, 1)])
+            add(f"flexural_rigidity{tail}", ["flexural_rigidity"], link.flexural_rigidity, [(bend, 1)])
+        ratios = link.damping_ratio
+        if not isinstance(ratios, str):
+            leaves = [
+                (lambda a, i=i, k=k: a.links[i].damping_ratio[k], 1) for k in range(len(ratios))
+            ]
+            add(f"damping_ratio{tail}", ["damping_ratio"], ratios[0], leaves)
+    for i, joint in enumerate(arm.joints):
+        tail = f"_{i + 1}" if len(arm.joints) > 1 else ""
+        for field in ("hub_inertia", "hub_mass", "viscous_friction", "rotor_inertia"):
+            if field == "hub_mass" and i == 0:
+                continue  # carried by the base
+            leaf = (lambda a, i=i, field=field: getattr(a.joints[i], field), 1)
+            add(field + tail, [field], getattr(joint, field), [leaf])
+        if joint.motor is None or arm.drive == "torque":
+            continue
+        fields = ["torque_constant"]
+        if arm.drive == "voltage":
+            fields += ["resistance", "inductance", "back_emf_constant"]
+        for field in fields:
+            leaf = (lambda a, i=i, field=field: getattr(a.joints[i].motor, field), 1)
+            add(field + tail, [field], getattr(joint.motor, field), [leaf])
+    if arm.links:
+        add("payload_mass", ["payload_mass", "mass"], arm.payload.mass, [(lambda a: a.payload.mass, 1)])
+        inertia = (lambda a: a.payload.inertia, 1)
+        add("payload_inertia", ["payload_inertia", "inertia"], arm.payload.inertia, [inertia])
+    return found

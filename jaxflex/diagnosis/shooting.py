@@ -1,0 +1,271 @@
+"""Gauss-Newton over pieces joined end to end: multiple shooting with continuity condensed away.
+
+Within a horizon the starts of all pieces but the first follow from it through the
+linearised motion; the first is free and is eliminated. What is left is a small least
+squares problem in the parameters, the same for a horizon of a tenth of a second and for
+a whole run (Bock's direct multiple shooting).
+"""
+
+from dataclasses import dataclass, field
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.signal import lfilter
+
+from .parameters import Parameters
+from .plant import Direction, Instruments, Pieces, Response, respond, slopes, state_size
+
+LANES = 12  # directions differentiated side by side: one compiled program whatever their number
+
+
+@dataclass
+class Run:
+    """A recording cut into pieces, with the states its pieces start from."""
+
+    name: str
+    times: np.ndarray  # (samples,)
+    command: np.ndarray  # (samples, joints), as logged
+    reading: np.ndarray  # (pieces, samples, channels)
+    valid: np.ndarray  # (pieces, samples)
+    starts: np.ndarray  # (pieces, states)
+
+    @property
+    def pieces(self) -> int:
+        return self.reading.shape[0]
+
+
+@dataclass
+class Setting:
+    """All that stays fixed during a diagnosis."""
+
+    parameters: Parameters
+    channels: tuple[str, ...]
+    noise: np.ndarray  # standard deviation of each channel
+    colour: list[np.ndarray]  # coefficients of the whitening filter of each channel, first one 1
+    sample_time: float
+    length: int  # samples in a piece
+    substeps: int
+    start_spread: np.ndarray  # how far a start may be from what was guessed, (states,)
+
+
+@dataclass
+class Linearised:
+    """A run made linear about its pieces: residuals and slopes in units of the noise."""
+
+    residual: np.ndarray  # (pieces, samples, channels)
+    by_start: np.ndarray  # (pieces, samples, channels, states)
+    by_column: np.ndarray  # (pieces, samples, channels, columns)
+    end_by_start: np.ndarray  # (pieces, states, states)
+    end_by_column: np.ndarray  # (pieces, states, columns)
+    gap: np.ndarray  # (pieces, states): where a piece ends, less where the next begins
+
+
+@dataclass
+class Normal:
+    """Least squares in the columns alone, the starts eliminated: `N d = g`, cost at d = 0."""
+
+    matrix: np.ndarray
+    vector: np.ndarray
+    cost: float
+    count: int
+    back: list = field(default_factory=list)  # what gives the starts once d is known
+
+    def __add__(self, other: "Normal") -> "Normal":
+        return Normal(
+            self.matrix + other.matrix, self.vector + other.vector,
+            self.cost + other.cost, self.count + other.count, [*self.back, *other.back],
+        )  # fmt: skip
+
+
+def delayed(times: np.ndarray, command: np.ndarray, delay: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """A command held between samples, as its mean over each interval when late by `delay` [s]; and its slope."""
+    knots = np.append(times, times[-1] + dt)
+    area = np.concatenate([[0.0], np.cumsum(command) * dt])
+    first = command[0]
+
+    def upto(t):
+        return np.where(t < knots[0], first * (t - knots[0]), np.interp(t, knots, area))
+
+    def at(t):
+        index = np.clip(np.floor((t - knots[0]) / dt + 1e-9).astype(int), 0, len(command) - 1)
+        return command[index]
+
+    mean = (upto(knots[1:] - delay) - upto(knots[:-1] - delay)) / dt
+    # the slope just above the delay: at no delay the interval begins to see the command before
+    slope = -(at(knots[1:] - delay - 1e-9 * dt) - at(knots[:-1] - delay - 1e-9 * dt)) / dt
+    return mean, slope
+
+
+class Problem:
+    """Runs and parameters, linearised and solved."""
+
+    def __init__(self, setting: Setting, runs: list[Run]):
+        self.setting = setting
+        self.runs = runs
+        self._delay = [
+            next(
+                (
+                    len(setting.parameters.nominal) + i
+                    for i, part in enumerate(setting.parameters.effect)
+                    if part.effect == "input_delay" and part.location == f"joint_{joint + 1}"
+                ),
+                None,
+            )
+            for joint in range(len(setting.parameters.arm.joints))
+        ]
+        self._constants = eqx.filter_jit(lambda v: setting.parameters.build(v).assemble())
+        self._tangents = eqx.filter_jit(self._constants_along)
+
+    def _constants_along(self, vector, directions):
+        def arrays(v):
+            return eqx.filter(self.setting.parameters.build(v).assemble(), eqx.is_inexact_array)
+
+        return jax.vmap(lambda d: jax.jvp(arrays, (vector,), (d,))[1])(directions)
+
+    def instruments(self, vector: np.ndarray) -> Instruments:
+        """The instruments that a parameter vector stands for."""
+        values = {"sensor_gain": [], "sensor_bias": [], "sensor_drift": [], "sensor_lag": []}
+        found = {
+            (part.effect, part.location): vector[len(self.setting.parameters.nominal) + i]
+            for i, part in enumerate(self.setting.parameters.effect)
+        }
+        for name in self.setting.channels:
+            for kind, entries in values.items():
+                entries.append(found.get((kind, name), 0.0))
+        gain, bias, drift, lag = (np.array(v, dtype=float) for v in values.values())
+        return Instruments(1 + gain, bias, drift, lag)
+
+    def pieces(self, run: Run, vector: np.ndarray) -> tuple[Pieces, np.ndarray]:
+        """The pieces of a run under the delays of `vector`, and the slope of commands with delay."""
+        s = self.setting
+        columns, rates = [], []
+        for joint in range(run.command.shape[1]):
+            at = self._delay[joint]
+            delay = 0.0 if at is None else float(vector[at])
+            mean, slope = delayed(run.times, run.command[:, joint], delay, s.sample_time)
+            columns.append(mean)
+            rates.append(slope)
+        shape = (run.pieces, s.length)
+        total = run.pieces * s.length
+
+        def cut(values):
+            return np.pad(values, (0, total - len(values)), mode="edge").reshape(shape)
+
+        time = run.times[0] + np.arange(total).reshape(shape) * s.sample_time
+        command = np.stack([cut(c) for c in columns], -1)
+        slope = np.stack([cut(c) for c in rates], -1)
+        return Pieces(jnp.asarray(command), jnp.asarray(time), s.sample_time, s.substeps), slope
+
+    def predict(self, run: Run, vector: np.ndarray) -> Response:
+        """What the pieces of a run show from their starts."""
+        model = self._constants(jnp.asarray(vector))
+        pieces, _ = self.pieces(run, vector)
+        found = respond(model, self.instruments(vector), self.setting.channels, jnp.asarray(run.starts), pieces)
+        return Response(*(np.asarray(part) for part in found))
+
+    def linearise(
+        self, run: Run, vector: np.ndarray, columns: list[int], forcing: np.ndarray | None = None
+    ) -> Linearised:
+        """A run about its starts and `vector`, with slopes by the parameters at `columns`.
+
+        `forcing`: `(more, pieces, samples, joints + coordinates)` of further columns, each a
+        sequence of changes of the commands and of forces on the coordinates.
+        """
+        s = self.setting
+        model = self._constants(jnp.asarray(vector))
+        instruments = self.instruments(vector)
+        pieces, delay_slope = self.pieces(run, vector)
+        response = self.predict(run, vector)
+        states, joints, size = run.starts.shape[1], run.command.shape[1], model.size
+        more = 0 if forcing is None else len(forcing)
+        total = states + len(columns) + more
+        lanes = -(-total // LANES) * LANES
+        start = np.zeros((lanes, states))
+        start[np.arange(states), np.arange(states)] = 1.0
+        unit = np.zeros((lanes, len(vector)))
+        command = np.zeros((lanes, run.pieces, s.length, joints))
+        force = np.zeros((lanes, run.pieces, s.length, size))
+        delays = {at: joint for joint, at in enumerate(self._delay) if at is not None}
+        for k, column in enumerate(columns):
+            unit[states + k, column] = 1.0
+            if column in delays:
+                command[states + k, :, :, delays[column]] = delay_slope[..., delays[column]]
+        if forcing is not None:
+            command[states + len(columns) : total] = forcing[..., :joints]
+            force[states + len(columns) : total] = forcing[..., joints:]
+        readings, ends = [], []
+        for first in range(0, lanes, LANES):
+            part = slice(first, first + LANES)
+            arrays = self._tangents(jnp.asarray(vector), jnp.asarray(unit[part]))
+            moved = self._instruments_along(unit[part])
+            direction = Direction(
+                arrays, moved, jnp.asarray(start[part, None, :]), jnp.asarray(command[part]),
+                jnp.asarray(force[part]),
+            )  # fmt: skip
+            found = slopes(model, instruments, s.channels, jnp.asarray(run.starts), pieces, direction)
+            readings.append(np.asarray(found.reading))
+            ends.append(np.asarray(found.end))
+        reading = np.moveaxis(np.concatenate(readings)[:total], 0, -1) / s.noise[:, None]
+        end = np.moveaxis(np.concatenate(ends)[:total], 0, -1)
+        gap = np.zeros_like(run.starts)
+        gap[:-1] = response.end[:-1] - run.starts[1:]
+        residual = np.where(run.valid[..., None], (run.reading - response.reading) / s.noise, 0.0)
+        reading = np.where(run.valid[..., None, None], reading, 0.0)
+        return Linearised(
+            residual, reading[..., :states], reading[..., states:], end[..., :states], end[..., states:], gap
+        )
+
+    def _instruments_along(self, unit: np.ndarray) -> Instruments:
+        zero = self.instruments(np.zeros(unit.shape[1]))
+        rows = [self.instruments(row) for row in unit]
+        return Instruments(*(np.stack([r[k] - zero[k] for r in rows]) for k in range(4)))
+
+    def condense(self, run: Run, linear: Linearised, horizon: int) -> Normal:
+        """Least squares in the columns, over horizons of `horizon` pieces, starts eliminated."""
+        s = self.setting
+        columns = linear.by_column.shape[-1]
+        states = run.starts.shape[1]
+        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0)
+        cuts = np.unique(np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int))
+        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+            by_start, by_column, offset = np.eye(states), np.zeros((states, columns)), np.zeros(states)
+            rows, kept = [], []
+            for j in range(first, last):
+                kept.append((j, by_start, by_column, offset))
+                slope = linear.by_start[j]
+                rows.append(
+                    np.concatenate(
+                        [slope @ by_start, linear.by_column[j] + slope @ by_column,
+                         (linear.residual[j] - slope @ offset)[..., None]], -1,
+                    )
+                )  # fmt: skip
+                through = linear.end_by_start[j]
+                by_start, by_column = through @ by_start, through @ by_column + linear.end_by_column[j]
+                offset = through @ offset + linear.gap[j]
+            table = np.concatenate(rows)
+            for c, filter_ in enumerate(s.colour):
+                if len(filter_) > 1:
+                    table[:, c] = lfilter(filter_, [1.0], table[:, c], axis=0)
+            table = table.reshape(-1, states + columns + 1)
+            gram = table.T @ table
+            a = slice(0, states)
+            b = slice(states, states + columns)
+            inner = gram[a, a] + np.diag(1 / s.start_spread**2)
+            solved = np.linalg.solve(inner, gram[a, states:])
+            total = total + Normal(
+                gram[b, b] - gram[b, a] @ solved[:, :-1],
+                gram[b, -1] - gram[b, a] @ solved[:, -1],
+                gram[-1, -1] - gram[-1, a] @ solved[:, -1],
+                int(run.valid[first:last].sum()) * len(s.channels),
+                [(run, kept, solved)],
+            )
+        return total
+
+    def move_starts(self, normal: Normal, step: np.ndarray) -> None:
+        """Move the starts of all pieces as a step of the columns asks."""
+        for run, kept, solved in normal.back:
+            first = solved[:, -1] - solved[:, :-1] @ step
+            for j, by_start, by_column, offset in kept:
+                run.starts[j] = run.starts[j] + by_start @ first + by_column @ step + offset
