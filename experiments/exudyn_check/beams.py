@@ -1,6 +1,7 @@
 """The same arm in Exudyn: geometrically exact beams, which know no small deflection."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import exudyn as exu
@@ -34,13 +35,17 @@ class BeamArm:
         for i, link in enumerate(arm.links):
             heading += float(pose[i])
             along = np.array([np.cos(heading), np.sin(heading)])
-            length, rho, rigidity = float(link.length), float(link.mass_per_length), float(link.flexural_rigidity)
+            length, rho, rigidity = (
+                float(link.length),
+                float(link.mass_per_length),
+                float(link.flexural_rigidity),
+            )
             area = rho / DENSITY
             nodes = [
                 add.AddNode(item.NodeRigidBody2D(referenceCoordinates=[*(place + x * along), heading]))
                 for x in np.linspace(0.0, length, elements + 1)
             ]
-            for pair in zip(nodes[:-1], nodes[1:], strict=True):
+            for pair in pairwise(nodes):
                 add.AddObject(
                     item.ObjectBeamGeometricallyExact2D(
                         nodeNumbers=list(pair),
@@ -79,7 +84,9 @@ class BeamArm:
         if locked:
             turn = [add.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=2))]
             if self.tips:
-                turn.insert(0, add.AddMarker(item.MarkerNodeCoordinate(nodeNumber=self.tips[-1], coordinate=2)))
+                turn.insert(
+                    0, add.AddMarker(item.MarkerNodeCoordinate(nodeNumber=self.tips[-1], coordinate=2))
+                )
             else:
                 fixed = add.AddNode(item.NodePointGround())
                 turn.insert(0, add.AddMarker(item.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0)))
@@ -90,17 +97,16 @@ class BeamArm:
         self.system.Assemble()
         return np.sort(self.system.ComputeODE2Eigenvalues(convert2Frequencies=True)[0])[:count]
 
-    def simulate(self, torque: Callable[[float], np.ndarray], end: float, step: float, samples: int) -> Motion:
-        """Motion under `torque(t)` [N m] of every joint, `samples` times between 0 and `end` [s].
+    def simulate(self, torque: Callable[[float], np.ndarray], end: float, samples: int, each: int) -> Motion:
+        """Motion under `torque(t)` [N m] of every joint until `end` [s], seen `samples` times.
 
-        Generalised-alpha steps of `step` [s] with Newton's method.
+        Generalised-alpha with Newton's method, `each` steps a sample.
         """
         add = self.system
         for i in range(self.links):
             self._torque(self.roots[i], lambda t, i=i: torque(t)[i])
             if i > 0:
                 self._torque(self.tips[i - 1], lambda t, i=i: -torque(t)[i])
-        period = end / samples
         sensors = [
             add.AddSensor(
                 item.SensorNode(
@@ -111,7 +117,7 @@ class BeamArm:
         ]
         add.Assemble()
         settings = exu.SimulationSettings()
-        settings.timeIntegration.numberOfSteps = round(end / step)
+        settings.timeIntegration.numberOfSteps = samples * each
         settings.timeIntegration.endTime = end
         settings.timeIntegration.verboseMode = 0
         settings.timeIntegration.adaptiveStep = False
@@ -119,9 +125,9 @@ class BeamArm:
         settings.timeIntegration.newton.useModifiedNewton = True
         settings.timeIntegration.newton.relativeTolerance = 1e-6
         settings.timeIntegration.newton.absoluteTolerance = 1e-6
-        settings.solutionSettings.sensorsWritePeriod = period
-        settings.solutionSettings.writeSolutionToFile = False
-        settings.linearSolverType = exu.LinearSolverType.EigenSparse
+        settings.solution.sensors.writePeriod = end / samples
+        settings.solution.file.write = False
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         add.SolveDynamic(settings)
         seen = [add.GetSensorStoredData(sensor) for sensor in sensors]
         start = [np.array(add.GetNode(node)["referenceCoordinates"]) for node in (*self.roots, *self.tips)]

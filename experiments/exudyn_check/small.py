@@ -12,12 +12,13 @@ from .compare import Pair, both, sine
 COMPARED = 4  # elastic frequencies of every case
 
 
-def frequencies(elements: int, payloads) -> dict[str, dict[str, list[float]]]:
-    """Elastic frequencies [Hz] of both programs, joints free and locked."""
+def frequencies(elements: int, payloads, links=(1, 2)) -> dict[str, dict[str, list[float]]]:
+    """Elastic frequencies [Hz] of both programs, joints free and locked; `links` of the arms compared."""
     cases = {}
     for payload in payloads:
         grams = f"{1000 * payload:.0f} g"
-        cases[f"one link, {grams}"] = (one_link(payload, modes=4), [0.0])
+        if 1 in links:
+            cases[f"one link, {grams}"] = (one_link(payload, modes=4), [0.0])
         for bend in (0.0, 90.0):
             cases[f"two links, {grams}, second joint at {bend:.0f} deg"] = (
                 two_links(payload),
@@ -35,6 +36,17 @@ def frequencies(elements: int, payloads) -> dict[str, dict[str, list[float]]]:
     return table
 
 
+def refinement(elements) -> dict[str, float]:
+    """Largest difference of the frequencies of one link [%] by number of Exudyn's elements."""
+    arm = one_link(0.0, modes=6)
+    ours = jf.locked_frequencies(arm)[:COMPARED]
+    found = {}
+    for n in elements:
+        theirs = BeamArm(arm, [0.0], n, locked=True).frequencies(COMPARED)
+        found[str(n)] = max(abs(v) for v in _pair(theirs, ours)["difference_pct"])
+    return found
+
+
 def _pair(theirs, ours) -> dict[str, list[float]]:
     off = 100 * (np.asarray(ours) / theirs - 1)
     return {
@@ -49,9 +61,7 @@ def motions(elements: int, payloads) -> dict[str, Pair]:
     pairs = {}
     for payload in payloads:
         grams = f"{1000 * payload:.0f} g"
-        pairs[f"one link, {grams}"] = both(
-            one_link(payload), [0.0], sine((0.1,), 1.0, 1, 3.0), elements
-        )
+        pairs[f"one link, {grams}"] = both(one_link(payload), [0.0], sine((0.1,), 1.0, 1, 3.0), elements)
         pairs[f"two links, {grams}"] = both(
             two_links(payload), [0.0, 0.5], sine((0.15, 0.08), 2.0, 1, 3.0), elements
         )
