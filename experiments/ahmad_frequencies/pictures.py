@@ -38,7 +38,7 @@ def plot_effects(payloads, bends, found) -> Figure:
             axis.yaxis.set_major_formatter("{x:g}")
             axis.yaxis.set_minor_formatter("")
         row[0].set_ylabel("natural frequency [Hz]")
-    axes[0, 0].legend(frameon=False, fontsize=8, loc="lower left")
+    axes[0, 0].legend(frameon=False, fontsize=8, loc="center")
     return figure
 
 

@@ -39,13 +39,19 @@ def settling_time(times: Float[Array, " times"], share: Float[Array, " times"]) 
     return times[last] + part * (times[after] - times[last])
 
 
-def measures(times: Float[Array, " times"], angle: Float[Array, " times"]) -> Float[Array, "3"]:
-    """Rise time, settling time [s] and overshoot [%] towards the last value of `angle`."""
+def measures(
+    times: Float[Array, " times"], angle: Float[Array, " times"], until: int | None
+) -> Float[Array, "3"]:
+    """Rise time, settling time [s] and overshoot [%] towards the last value of `angle`.
+
+    With `until`, the settling time looks at the samples up to that one alone, and towards it.
+    """
     share = angle / angle[-1]
+    seen = slice(None) if until is None else slice(until + 1)
     return jnp.stack(
         [
             jf.rise_time(times, share, 0.0, 1.0),
-            settling_time(times, share),
+            settling_time(times[seen], angle[seen] / angle[seen][-1]),
             jf.overshoot(share, 0.0, 1.0),
         ]
     )

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from controllers.minimise import make_stepper, minimise
 
 from .paper import PAYLOADS, TABLE_II, measures
-from .unknowns import DURATION, Choice, angles, domain, printed
+from .unknowns import DURATION, WIDTH, Choice, angles, domain, printed
 
 SCALES = jnp.array([0.02, 0.02, 2.0])  # s, s, %: what counts as one unit of misfit
 
@@ -30,9 +30,11 @@ def table(choice: Choice, numbers, payloads, dt: float):
     """Measures `(joint, payload, column)` and final angles [rad] `(joint, payload)`."""
     times = jnp.linspace(0.0, DURATION, round(DURATION / dt) + 1)
 
+    until = round(2 * WIDTH / dt) if choice.early else None
+
     def one(payload):
         both = angles(choice, numbers, payload, dt)
-        return jnp.stack([measures(times, both[0]), measures(times, both[1])]), both[:, -1]
+        return jnp.stack([measures(times, angle, until) for angle in both]), both[:, -1]
 
     rows, final = jax.vmap(one)(jnp.asarray(payloads))
     return jnp.moveaxis(rows, 0, 1), final.T

@@ -11,31 +11,36 @@ from jaxtyping import Array, Float
 import controllers as ctl
 import jaxflex as jf
 
-DURATION, TORQUE = 5.0, 0.2  # s, N m
+DURATION, TORQUE, WIDTH = 5.0, 0.2, 1.0  # s, N m, s
 
 
 class Choice(NamedTuple):
     """The choices that are not numbers.
 
     `joints`: which are driven; `shapes`: mode shapes of the links; `frozen`: the
-    equations made linear about the stretched arm, or not.
+    equations made linear about the stretched arm, or not; `early`: settling looked at
+    until the torque ends and towards the angle there, or over the whole run.
     """
 
     joints: tuple[float, float]
     shapes: str
     frozen: bool
+    early: bool = False
 
     def __str__(self) -> str:
         driven = {(1.0, 1.0): "both joints driven", (1.0, 0.0): "first driven", (0.0, 1.0): "second driven"}
-        return f"{driven[self.joints]}, {self.shapes}, {'linear' if self.frozen else 'nonlinear'}"
+        model = "linear" if self.frozen else "nonlinear"
+        end = "the torque" if self.early else "the run"
+        return f"{driven[self.joints]}, {self.shapes}, {model}, settling by the end of {end}"
 
 
 PRINTED = Choice((1.0, 1.0), "clamped_tip_mass", False)
 CHOICES = [
-    Choice(joints, shapes, frozen)
+    Choice(joints, shapes, frozen, early)
     for joints in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))
     for shapes in ("clamped_tip_mass", "distal_mass_and_moment")
     for frozen in (False, True)
+    for early in (False, True)
 ]
 
 # name: value as printed (or taken, where nothing is), lowest and highest that are searched
@@ -76,7 +81,7 @@ def arm_of(choice: Choice, numbers: Float[Array, " numbers"], payload) -> jf.Arm
 
 def bang_bang(choice: Choice, numbers: Float[Array, " numbers"]) -> ctl.BangBang:
     """The torque [N m] of both joints."""
-    return ctl.BangBang((TORQUE * choice.joints[0], TORQUE * choice.joints[1] * numbers[-1]))
+    return ctl.BangBang((TORQUE * choice.joints[0], TORQUE * choice.joints[1] * numbers[-1]), WIDTH)
 
 
 def angles(choice: Choice, numbers: Float[Array, " numbers"], payload, dt: float) -> Float[Array, "2 times"]:
