@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from .paper import TABLE_III
 
 
-def plot_spectra(f, density, grams, peaks, exact) -> Figure:
+def plot_spectra(f, density, grams, peaks, frequencies, radius) -> Figure:
     """Spectra by payload, and their peaks against payload with the paper's figures and the exact ones."""
     figure = Figure(figsize=(10.5, 7.0), layout="constrained")
     axes = figure.subplots(2, 2)
@@ -16,8 +16,8 @@ def plot_spectra(f, density, grams, peaks, exact) -> Figure:
         left, right = axes[link]
         for i, (gram, shade) in enumerate(zip(grams, shades, strict=True)):
             left.semilogy(f[1:], density[i, link][1:], color=shade, linewidth=1.1, label=f"{gram} g")
-        for i, height in ((0, 0.86), (len(grams) - 1, 0.7)):
-            for peak in labelled(peaks[i][link]):
+        for i, height in ((0, 0.9), (len(grams) - 1, 0.76)):
+            for peak in labelled(peaks[i][link], peaks[0][link] if i else []):
                 left.axvline(peak, ymax=height, color=shades[i], linewidth=0.6, linestyle=":")
                 left.annotate(f"{peak:.1f} Hz", (peak, height), xycoords=("data", "axes fraction"), ha="center",
                               xytext=(0, 2), textcoords="offset points", fontsize=8, rotation=90,
@@ -26,10 +26,15 @@ def plot_spectra(f, density, grams, peaks, exact) -> Figure:
         left.set_xlim(1.0, f[-1])
         left.set_xticks([1, 2, 3, 5, 10, 20, 30, 40], ["1", "2", "3", "5", "10", "20", "30", "40"])
         left.xaxis.set_minor_formatter("")
-        left.margins(y=0.4)
+        left.set_ylim(0.3 * density[:, link, 1:].min(), 1e4 * density[:, link].max())
         left.set_ylabel(f"tip acceleration of link {link + 1} [(m/s²)²/Hz]")
-        for j in range(exact.shape[1]):
-            right.semilogy(grams, exact[:, j], color="0.6", linewidth=1.2, label="exact" if j == 0 else None)
+        bodies = {
+            "exact": "exact, payload a point",
+            "exact, payload with inertia": f"exact, radius {1000 * radius:.0f} mm",
+        }
+        for (name, label), style in zip(bodies.items(), ("-", ":"), strict=True):
+            lines = right.semilogy(grams, frequencies[name], style, color="0.55", linewidth=1.3)
+            lines[0].set_label(label)
         for i, gram in enumerate(grams):
             right.plot([gram] * len(peaks[i][link]), peaks[i][link], "o", color=shades[i], markersize=6,
                        fillstyle="none", label="peaks of the spectrum" if i == 0 else None)  # fmt: skip
@@ -40,7 +45,7 @@ def plot_spectra(f, density, grams, peaks, exact) -> Figure:
         right.set_ylabel(f"resonances of link {link + 1} [Hz]")
     axes[1, 0].set_xlabel("frequency [Hz]")
     axes[1, 1].set_xlabel("payload [g]")
-    axes[0, 0].legend(title="payload", fontsize=7, title_fontsize=7, frameon=False, ncols=2, loc="lower left")
+    axes[0, 0].legend(title="payload", fontsize=7, title_fontsize=7, ncols=2, loc="lower left")
     axes[0, 1].legend(fontsize=8, frameon=False, loc="center")
     for axis in axes.flat:
         axis.grid(True, alpha=0.3, linewidth=0.5)
@@ -48,10 +53,10 @@ def plot_spectra(f, density, grams, peaks, exact) -> Figure:
     return figure
 
 
-def labelled(peaks: list[float]) -> list[float]:
-    """Those of ascending `peaks` [Hz] that can be labelled side by side."""
+def labelled(peaks: list[float], others: list[float]) -> list[float]:
+    """Those of `peaks` [Hz] that can be labelled beside each other and beside `others`."""
     chosen: list[float] = []
     for peak in peaks:
-        if not chosen or peak > 1.08 * chosen[-1]:
+        if all(abs(np.log(peak / near)) > 0.04 for near in [*chosen, *others]):
             chosen.append(peak)
     return chosen
