@@ -15,7 +15,7 @@ from .pictures import plot_moves
 
 PAYLOADS = (0.0, 0.02, 0.05, 0.08, 0.1)  # kg
 TUNED_ON = [0.0, 0.05, 0.1]  # kg; the others are new to the tuned design
-SHAPER = "ZVD"
+SHAPER = "ZV"
 
 
 class Case(NamedTuple):
@@ -55,7 +55,7 @@ def fare(arm: jf.Arm, chosen: dict[str, ctl.Design]) -> Case:
 def run(folder: Path, reduced: bool) -> dict[str, Any]:
     """What do feedback, a shaper and tuning buy on this arm, with gravity and with a third link?"""
     two, three = jf.ahmad_arm(0.05, modes=1 if reduced else 2), three_links(0.05)
-    steps = 0 if reduced else 30
+    steps = 0 if reduced else 24
     own = designs(two, steps)
     cases = {
         "two links": fare(two, own),

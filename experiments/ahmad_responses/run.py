@@ -3,43 +3,33 @@
 from pathlib import Path
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .paper import COLUMNS, PAYLOADS, TABLE_II
 from .pictures import plot_responses, plot_table
 from .search import Found, evaluate, search
-from .unknowns import CHOICES, NUMBERS, PRINTED, angles, printed
+from .unknowns import CHOICES, NUMBERS, PRINTED, printed
 
 STEP = 1e-3  # s, the paper's
-SEARCHED = 3  # of the choices closest to Table II, so many linear and so many nonlinear
 
 
 def run(folder: Path, reduced: bool) -> dict[str, Any]:
     """Does Table II follow from what the paper prints, and if not, from which assumptions could it?"""
     payloads = (0.0, 0.1) if reduced else PAYLOADS
-    choices = [PRINTED, PRINTED._replace(frozen=True, early=True)] if reduced else CHOICES
-    step = 2.5e-3 if reduced else STEP
-    tried = [evaluate(choice, printed(), payloads, step) for choice in choices]
-    tried.sort(key=lambda found: found.misfit)
-    steps, starts, coarse = (3, 1, 1e-2) if reduced else (30, 3, 2.5e-3)
-    first = [
-        found
-        for frozen in ((True,) if reduced else (True, False))
-        for found in [f for f in tried if f.choice.frozen == frozen][: 1 if reduced else SEARCHED]
-    ]
+    choices = [PRINTED, PRINTED._replace(frozen=True)] if reduced else CHOICES
+    step, coarse = (2.5e-3, 1e-2) if reduced else (STEP, 2.5e-3)
+    tried = _ranked([found for choice in choices for found in evaluate(choice, printed(), payloads, step)])
+    steps, starts = (3, 1) if reduced else (25, 3)
     fitted = []
-    for found in first:
-        numbers = search(
-            found.choice, (0.0, 0.1) if reduced else (0.0, 0.04, 0.1), steps, starts, coarse
-        ).numbers
-        fitted.append(evaluate(found.choice, numbers, payloads, step))
-    fitted.sort(key=lambda found: found.misfit)
+    for frozen in (True,) if reduced else (True, False):
+        choice = next(found.choice for found in tried if found.choice.frozen == frozen)
+        numbers = search(choice, (0.0, 0.1), steps, starts, coarse)
+        fitted += [found for found in evaluate(choice, numbers, payloads, step) if found.choice == choice]
+    fitted = _ranked(fitted)
     as_printed = next(found for found in tried if found.choice == PRINTED)
     best = fitted[0]
     if not reduced:
-        curves = [_curves(found, payloads) for found in (as_printed, tried[0], best)]
+        curves = [found.curves for found in (as_printed, tried[0], best)]
         titles = ["as printed", "closest choices, numbers as printed", "closest choices and numbers"]
         plot_responses(payloads, dict(zip(titles, curves, strict=True))).savefig(
             folder / "responses.png", dpi=130
@@ -56,9 +46,8 @@ def run(folder: Path, reduced: bool) -> dict[str, Any]:
     }
 
 
-def _curves(found: Found, payloads) -> np.ndarray:
-    of = jax.jit(jax.vmap(lambda p: angles(found.choice, found.numbers, p, STEP)))
-    return np.asarray(of(jnp.asarray(payloads)))
+def _ranked(cases: list[Found]) -> list[Found]:
+    return sorted(cases, key=lambda found: found.misfit)
 
 
 def _figures(found: Found) -> dict[str, Any]:
@@ -67,7 +56,7 @@ def _figures(found: Found) -> dict[str, Any]:
         "misfit": _round(found.misfit),
         "numbers": {name: _round(v) for name, v in zip(NUMBERS, found.numbers, strict=True)},
         "table": [[[_round(v) for v in row] for row in joint] for joint in found.table],
-        "final_angle_rad": [[_round(v) for v in joint] for joint in found.final],
+        "final_angle_rad": [[_round(v) for v in joint] for joint in found.curves[..., -1].T],
     }
 
 

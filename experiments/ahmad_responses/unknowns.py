@@ -36,11 +36,10 @@ class Choice(NamedTuple):
 
 PRINTED = Choice((1.0, 1.0), "clamped_tip_mass", False)
 CHOICES = [
-    Choice(joints, shapes, frozen, early)
+    Choice(joints, shapes, frozen)
     for joints in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))
     for shapes in ("clamped_tip_mass", "distal_mass_and_moment")
     for frozen in (False, True)
-    for early in (False, True)
 ]
 
 # name: value as printed (or taken, where nothing is), lowest and highest that are searched

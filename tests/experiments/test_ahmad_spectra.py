@@ -23,5 +23,12 @@ def test_the_papers_second_link_is_the_exact_one_without_payload(figures):
 
 def test_resonances_are_told_from_ripple():
     f = np.linspace(0.0, 40.0, 401)
-    density = 1 / ((f - 12) ** 2 + 0.1) + 2 / ((f - 30) ** 2 + 0.1) + 0.02 * (1 + np.cos(40 * f))
+    density = 1 / ((f - 12) ** 2 + 0.1) + 2 / ((f - 30) ** 2 + 0.1) + 0.02 * (3 + np.cos(40 * f))
     assert resonances(f, density) == [12.0, 30.0]
+
+
+def test_the_papers_second_link_implies_an_extended_payload(figures):
+    assert 40 < figures["radius_of_gyration_mm"] < 70
+    for row in figures["payloads"].values():
+        found = np.array(row["exact, payload with inertia_hz"])
+        assert np.min(np.abs(found - row["paper_hz"][1][1])) < 0.7
