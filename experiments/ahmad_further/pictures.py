@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-COLOURS = ("#c44e52", "#dd8452", "#2a6f97")
+LENGTH = 0.5  # m, of every link
+COLOURS = {"textbook PD": "#c44e52", "textbook PD, ZVD": "#dd8452", "tuned": "#2a6f97"}
 
 
 def plot_moves(cases, payload: int) -> Figure:
@@ -16,11 +17,11 @@ def plot_moves(cases, payload: int) -> Figure:
             times = np.asarray(trajectory.times[i, payload])
             tip = np.stack([np.asarray(trajectory[f"tip_{axis}"][i, payload]) for axis in "xy"], axis=1)
             angles = np.cumsum([float(a) for a in design.move.stop])
-            target = 0.5 * np.array([np.cos(angles).sum(), np.sin(angles).sum()])
+            target = LENGTH * np.array([np.cos(angles).sum(), np.sin(angles).sum()])
             away = np.linalg.norm(tip - target, axis=1)
-            axes[0, column].semilogy(times, 1e3 * away, color=COLOURS[i], linewidth=1.2, label=name)
+            axes[0, column].semilogy(times, 1e3 * away, color=COLOURS[name], linewidth=1.2, label=name)
             bend = np.asarray(trajectory["tip_deflection_1"][i, payload])
-            axes[1, column].plot(times, 1e3 * bend, color=COLOURS[i], linewidth=1.2)
+            axes[1, column].plot(times, 1e3 * bend, color=COLOURS[name], linewidth=1.2)
         end = float(design.move_time())
         for axis in axes[:, column]:
             axis.axvline(end, color="0.4", linestyle=":", linewidth=1)

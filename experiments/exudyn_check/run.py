@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from .large import EXUDYN, PLAIN, STIFF, pushed, shaken, spun
+from .arms import two_links
+from .large import EXUDYN, PLAIN, STIFF, pace, pushed, shaken, spun
 from .pictures import plot_small, plot_spin, plot_validity
 from .small import frequencies, motions, refinement
 
@@ -33,7 +34,7 @@ def run(folder: Path, reduced: bool) -> dict[str, Any]:
         what: [
             {
                 "deflection_share_pct": _percent(case[PLAIN].deflection_share()),
-                "hub_speed_over_first": round(case[PLAIN].hub_speed(f), 3),
+                "hub_speed_over_first": round(case[PLAIN].hub_speed(first), 3),
                 **{
                     f"tip_error_pct_of_arm, {name}": _percent(case[name].tip_error(reach))
                     for name in (PLAIN, STIFF)
@@ -41,7 +42,10 @@ def run(folder: Path, reduced: bool) -> dict[str, Any]:
             }
             for case in cases
         ]
-        for what, reach, cases in (("one link shaken", 0.5, shakes), ("two links pushed", 1.0, moves))
+        for what, reach, cases, first in (
+            ("one link shaken", 0.5, shakes, f),
+            ("two links pushed", 1.0, moves, pace(two_links(0.05))),
+        )
     }
     figures: dict[str, Any] = {
         "frequencies": table,
