@@ -17,9 +17,9 @@ def run(folder: Path, reduced: bool) -> dict[str, Any]:
     """Does Table II follow from what the paper prints, and if not, from which assumptions could it?"""
     payloads = (0.0, 0.1) if reduced else PAYLOADS
     choices = [PRINTED, PRINTED._replace(frozen=True)] if reduced else CHOICES
-    step, coarse = (2.5e-3, 1e-2) if reduced else (STEP, 2.5e-3)
+    step, coarse = 2.5e-3 if reduced else STEP, 2.5e-3
     tried = _ranked([found for choice in choices for found in evaluate(choice, printed(), payloads, step)])
-    steps, starts = (3, 1) if reduced else (25, 3)
+    steps, starts = (8, 1) if reduced else (25, 3)
     fitted = []
     for frozen in (True,) if reduced else (True, False):
         choice = next(found.choice for found in tried if found.choice.frozen == frozen)

@@ -24,12 +24,10 @@ def test_the_arm_cannot_carry_itself_upright(figures):
     assert abs(figures["sag_pct_of_length"]["two links, base tilted by 90 deg"][0]) > 50
 
 
-def test_shaping_quiets_the_arm_with_every_payload(figures):
-    for case in ("two links", "two links, base tilted by 1 deg"):
-        designs = list(figures["designs"][case].values())
-        plain, shaped = (np.array(d["residual_vibration_mm"]) for d in designs)
-        assert np.all(shaped < plain)
-        assert max(max(d["peak_voltage_V"]) for d in designs) <= 24.0
+def test_a_heavier_payload_drags_a_tilted_arm_further_from_its_target(figures):
+    for design in figures["designs"]["two links, base tilted by 1 deg"].values():
+        assert np.all(np.diff(design["residual_vibration_mm"]) > 0)
+        assert max(design["peak_voltage_V"]) <= 24.0
 
 
 def test_three_links_are_an_arm_of_three(figures):
