@@ -74,6 +74,7 @@ from .sensors import Sensor as Sensor
 from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive
 from .simulation.methods import Fixed as Fixed
+from .simulation.runge_kutta import RungeKutta4 as RungeKutta4
 from .simulation.simulate import InitialState as InitialState
 from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import SimulationError as SimulationError

@@ -1,0 +1,1 @@
+"""The arm against a simulator that no one here wrote: Exudyn."""
