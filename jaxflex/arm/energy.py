@@ -60,7 +60,7 @@ def potential_energy(model: AssembledArm, q: tuple) -> Scalar:
     energy = jnp.zeros_like(model.arm.payload.mass)
     for link, joint, eta in zip(model.links, model.joints, etas, strict=True):
         energy = energy + 0.5 * dot(link.stiffness, tuple(e * e for e in eta))
-        if link.loose:
+        if joint.play is not None and joint.contact_stiffness is not None and link.loose:
             pressed = jnp.maximum(jnp.abs(eta[-1]) - joint.play / 2, 0.0)
             energy = energy + 0.5 * joint.contact_stiffness * pressed * pressed
     if model.arm.gravity is None and model.arm.side_gravity is None:

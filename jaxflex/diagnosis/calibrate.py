@@ -1,5 +1,8 @@
 """Fit parameters within their uncertainty: Gauss-Newton with chord steps, damped where it must be."""
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
 from dataclasses import dataclass
 
 import numpy as np

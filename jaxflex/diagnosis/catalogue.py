@@ -5,6 +5,9 @@ torque, or a voltage, that depends on the motion is a column of forces along the
 that the model predicts; all others are slopes by a parameter of the arm.
 """
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 

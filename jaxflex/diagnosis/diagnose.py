@@ -18,6 +18,8 @@ STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain wo
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
+SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
+HALF = 0.4  # of a larger one that an effect has to explain
 LEAD = 0.03  # of the gain: what a hypothesis with more parameters must be better by
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 
@@ -79,7 +81,7 @@ def find(search: Search) -> Outcome:
             confirmed.append((found.strength(fitted), found, search.starts()))
             say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
         strength, best, best_starts = simplest(confirmed)
-        if strength < STRONG:
+        if strength < STRONG or not _worth_it(fitted, best):
             break
         base, base_starts = best, best_starts
     assert outcome is not None
@@ -87,6 +89,14 @@ def find(search: Search) -> Outcome:
     prune(search, outcome)
     weigh(search, outcome)
     return outcome
+
+
+def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
+    """False for an effect that leaves most of a misfit that is clearly there."""
+    horizon = max(before.costs.keys() & after.costs.keys())
+    count = before.fit.count
+    left, gone = before.costs[horizon] / count - 1, (before.costs[horizon] - after.costs[horizon]) / count
+    return left < SMALL or gone > HALF * left
 
 
 def simplest(confirmed: list[tuple[float, Hypothesis, list]]) -> tuple[float, Hypothesis, list]:

@@ -1,5 +1,8 @@
 """A hypothesis: the nominal arm with some effects, fitted; and what it leaves unexplained."""
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
 import dataclasses
 from dataclasses import dataclass
 

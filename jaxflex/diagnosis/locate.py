@@ -5,6 +5,10 @@ squares, its size set by the evidence. The equation whose force explains most is
 something is missing, and the force drawn over speed, angle or time shows what.
 """
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +75,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
         part = slice(e * blocks, (e + 1) * blocks)
         values, evidence = _estimate(problem, run, linear, part, horizon)
         joint = min(int(name.rpartition("_")[2]) - 1, joints - 1)
-        middle = [(a + b) // 2 for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        middle = [(a + b) // 2 for a, b in itertools.pairwise(edges)]
         angle = motion.angle(joint).mean(0)[:, middle].ravel()
         rate = motion.rate(joint).mean(0)[:, middle].ravel()
         times = np.asarray(pieces.time)[:, middle].ravel()

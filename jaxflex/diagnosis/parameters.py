@@ -107,7 +107,7 @@ class Parameters:
     def substeps(self, vector: np.ndarray, sample_time: float, least: int) -> int:
         """Integration steps in a sample interval, more of them where friction is sharp."""
         needed = least
-        for j, part in enumerate(self.effect):
+        for part in self.effect:
             if part.field == "transition_rate":
                 width = STABLE * sample_time * self._lightness[_number(part.location)]
                 torque = abs(float(self._friction(vector, part)))

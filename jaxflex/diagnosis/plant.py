@@ -6,6 +6,9 @@ that all run side by side, none drifts away from what was measured, and one prog
 serves every horizon: long runs are pieces joined end to end by linear algebra.
 """
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
 from typing import Any, NamedTuple
 
 import equinox as eqx

@@ -1,5 +1,8 @@
 """From an arm file and recordings to a problem: channels, noise, pieces, and where each starts."""
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false, reportOptionalOperand=false
+
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -62,15 +65,15 @@ def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]
     """The arm with the current of windings much faster than a sample following at once."""
     joints, notes = [], []
     for i, joint in enumerate(arm.joints, 1):
+        joints.append(joint)
         motor = joint.motor
         if motor is not None and motor.inductance is not None:
             constant = float(motor.inductance / motor.resistance)
             if constant < FAST_WINDING * sample_time:
-                joint = dataclasses.replace(joint, motor=dataclasses.replace(motor, inductance=None))
+                joints[-1] = dataclasses.replace(joint, motor=dataclasses.replace(motor, inductance=None))
                 notes.append(
                     f"joint {i}: the winding (L/R = {1e3 * constant:.2g} ms) is taken to follow at once"
                 )
-        joints.append(joint)
     return dataclasses.replace(arm, joints=tuple(joints)), notes
 
 

@@ -1,5 +1,8 @@
 """Which effect would explain what is left: a score test of every candidate at once."""
 
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,11 +6,14 @@ squares problem in the parameters, the same for a horizon of a tenth of a second
 a whole run (Bock's direct multiple shooting).
 """
 
-import dataclasses
-from dataclasses import dataclass, field
+# arrays of numpy go to JAX and come back, which its annotations do not foresee
+# pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 
+import dataclasses
+import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from typing import Any
 
 import equinox as eqx
@@ -19,9 +22,9 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
-from ..arm.arm import Arm, AssembledArm
+from ..arm.arm import Arm
 from .parameters import Parameters
-from .plant import Direction, Instruments, Pieces, Response, respond, slopes, state_size
+from .plant import Direction, Instruments, Pieces, Response, respond, slopes
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 SLOPE_SUBSTEPS = 4  # enough for slopes, which chord steps make up for
@@ -41,6 +44,7 @@ class Run:
 
     @property
     def pieces(self) -> int:
+        """Number of pieces."""
         return self.reading.shape[0]
 
 
@@ -274,7 +278,7 @@ class Problem:
         cuts = np.unique(
             np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
         )
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in itertools.pairwise(cuts):
             by_start, by_column, offset = np.eye(states), np.zeros((states, columns)), np.zeros(states)
             rows, kept = [], []
             for j in range(first, last):
