@@ -7,16 +7,20 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.signal import find_peaks
 
 from .analysis.measures import spectrum
 from .diagnosis.locate import LatentForce
 from .diagnosis.result import Comparison, Gap
-from .plotting import AFTER, BEFORE, TITLES, panels, strongest_peaks
+from .plotting import AFTER, BEFORE, TITLES, panels
 from .sensors import unit
 
 WIDTH = 5.0  # inches: legible across a telephone, two side by side across a desk
 BINS = 30
 FEWEST = 4  # points that a bin's mean is drawn from
+TAILS = (0.5, 99.5)  # per cent: what lies outside is left out of a picture of a force
+SMOOTHED = 5  # neighbours that a spectrum is averaged over
+PROMINENCE = 0.8  # decades that a peak stands above both of its sides
 POINTS = 1500  # drawn of a cloud
 
 
@@ -129,8 +133,14 @@ def plot_force(view: View, before: LatentForce, after: LatentForce) -> Figure:
     """The missing force before and after against one quantity: points, binned mean and band of one std."""
     figure, axes = panels(1, 1, height=3.1, width=WIDTH)
     axis = axes[0, 0]
-    for force, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
-        _cloud(axis, view.quantity(force), force.values, colour, label)
+    x = [view.quantity(force) for force in (before, after)]
+    edges = np.linspace(*_spread(np.concatenate(x)), BINS + 1)
+    for place, force, colour, label in zip(
+        x, (before, after), (BEFORE, AFTER), ("before", "after"), strict=True
+    ):
+        _cloud(axis, place, force.values, edges, colour, label)
+    axis.set_xlim(edges[0], edges[-1])
+    axis.set_ylim(*_spread(np.concatenate([before.values, after.values])))
     axis.axhline(0.0, color="0.4", linewidth=0.6)
     axis.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
     axis.set_xlabel(view.axis)
@@ -147,16 +157,17 @@ def plot_force_spectrum(before: LatentForce, after: LatentForce) -> Figure:
     for force, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
         times = np.linspace(force.times[0], force.times[-1], len(force.times))
         f, density = map(np.asarray, spectrum(jnp.asarray(times), jnp.asarray(force.values)))
-        f, density = f[1:], density[1:]
-        if not np.any(density > 0):
+        f, density = f[1:], np.convolve(density[1:], np.full(SMOOTHED, 1 / SMOOTHED), "same")
+        if not np.all(density > 0):
             continue
-        axis.semilogy(f, density, color=colour, linewidth=0.9, label=label)
-        for peak in strongest_peaks(f, density, 3):
+        axis.semilogy(f, density, color=colour, linewidth=1.0, label=label)
+        peaks, found = find_peaks(np.log10(density), prominence=PROMINENCE)
+        for peak in peaks[np.argsort(-found["prominences"])][:3]:
             if any(abs(f[peak] - other) < 0.13 * f[-1] for other in labelled):
                 continue
-            labelled.append(f[peak])
+            labelled.append(float(f[peak]))
             axis.annotate(
-                f"{f[peak]:.2f} Hz", (f[peak], density[peak]), xytext=(0, 5),
+                f"{f[peak]:.1f} Hz", (f[peak], density[peak]), xytext=(0, 5),
                 textcoords="offset points", ha="center", fontsize=8, color=colour,
             )  # fmt: skip
     axis.set_xlabel("frequency [Hz]")
@@ -171,11 +182,17 @@ def _force_label(force: LatentForce) -> str:
     return f"{kind} that is missing [{force.unit}]"
 
 
-def _cloud(axis: Axes, x: np.ndarray, y: np.ndarray, colour: str, label: str) -> None:
+def _spread(values: np.ndarray) -> tuple[float, float]:
+    """Limits that show all but the tails, with a margin."""
+    low, high = np.percentile(values[np.isfinite(values)], TAILS)
+    margin = 0.08 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _cloud(axis: Axes, x: np.ndarray, y: np.ndarray, edges: np.ndarray, colour: str, label: str) -> None:
     step = max(1, len(x) // POINTS)
     axis.plot(x[::step], y[::step], ".", color=colour, markersize=2, alpha=0.3, zorder=1)
-    edges = np.linspace(x.min(), x.max(), BINS + 1)
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
+    place = np.searchsorted(edges, x, side="right") - 1
     bins = [y[place == b] for b in range(BINS)]
     mean = np.array([b.mean() if len(b) >= FEWEST else np.nan for b in bins])
     spread = np.array([b.std() if len(b) >= FEWEST else np.nan for b in bins])

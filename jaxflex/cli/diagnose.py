@@ -10,7 +10,7 @@ from ..files.arm_file import ArmFile, read_arm_file, save_arm
 from ..files.read_recording import read_recording
 from . import words
 from .diagnosis_report import draw, write_diagnosis_report
-from .diagnosis_tables import calibrated_table, effect_table, gap_table, where_table
+from .diagnosis_tables import calibrated_table, effect_table, far_moved, gap_table, where_table
 from .runtime import console, make_folder
 from .tables import write_json
 
@@ -50,20 +50,23 @@ def _search(file: ArmFile, recordings: Sequence) -> Diagnosis:
 def show(found: Diagnosis, file: ArmFile) -> None:
     """Print the answer."""
     console.print()
-    console.print(words.headline(found), style=STYLES[found.verdict], markup=False)
-    for text in (words.gap_closed(found), words.MEANING[found.verdict]):
-        if text:
-            console.print(text, markup=False)
+    first, *rest = words.answer(found)
+    console.print(first, style=STYLES[found.verdict], markup=False)
+    for sentence in rest:
+        console.print(sentence, markup=False)
     shown = [effect_table("Added to the model", found.effects)] if found.effects else []
     if found.alternatives:
         shown.append(effect_table("As good in its place", found.alternatives))
-    shown += [where_table(found)] if found.where else []
+    if found.verdict != "nothing_missing" and found.where:
+        shown.append(where_table(found))
     shown += [gap_table(found), calibrated_table(found, file)]
     for table in shown:
         console.print()
         console.print(table.rich())
     console.print()
-    console.print(f"Next: {found.next_experiment}", markup=False)
+    for text in (far_moved(found, file), f"Next: {found.next_experiment}"):
+        if text:
+            console.print(text, markup=False)
     for note in found.notes:
         console.print(f"Note: {note}", markup=False)
 

@@ -9,7 +9,7 @@ from ..diagnosis.result import Diagnosis
 from ..files.arm_file import ArmFile
 from ..plotting_diagnosis import SPECTRUM, VIEWS, plot_force, plot_force_spectrum, plot_gap, plot_prediction
 from . import words
-from .diagnosis_tables import calibrated_table, effect_table, gap_table, where_table
+from .diagnosis_tables import calibrated_table, effect_table, far_moved, gap_table, where_table
 from .report import bullets, card, grid, paragraph, picture, section, tables, write_report
 
 ACCENTS = {
@@ -20,15 +20,22 @@ ACCENTS = {
 }
 SHARP = 180  # dots an inch, for screens that show two to a pixel
 
+GAP = (
+    "The model is calibrated on a part of the recordings and judged by the rest, which is held out. Before "
+    "is the model with calibrated parameters alone, after is the one with what was added. The noise floor "
+    "is the part of a channel that no model can predict; a ratio near 1 is as good as can be."
+)
+PARAMETERS = "Fitted together with what was added, and held to the arm file by the uncertainty stated there."
 PREDICTIONS = (
     "Every prediction runs on its own for a second from an estimated start, then starts anew; the measured "
     "line hides those that agree with it, so the error is drawn below. Errors within the dotted lines are "
     "noise of the sensor."
 )
 FORCES = (
-    "Before the effect was added, and after: the force that would have to act on the arm, moment by moment, "
-    "for the model to be right. Its shape is its name. A point is a moment, the line their mean, the band "
-    "one standard deviation. What is wrong with a sensor is no force and has no clear shape here."
+    "What would have to act, moment by moment, for the model to be right: before anything was added, and "
+    "after. Its shape is its name. A point is a moment, the line their mean, the band "
+    "one standard deviation; the outermost hundredth is left out. What is wrong with a sensor is no force and "
+    "has no clear shape here."
 )
 EVIDENCE = (
     "The evidence of an effect is by how much the squared errors, in units of the noise, rise without it. "
@@ -65,7 +72,6 @@ def write_diagnosis_report(
     def shown(start: str) -> str:
         return grid(*(picture(*p, dpi=SHARP) for name, p in pictures.items() if name.startswith(start)))
 
-    verdict = [words.headline(found), words.gap_closed(found), words.MEANING[found.verdict]]
     named = [effect_table("What was added to the model", found.effects)] if found.effects else []
     if found.alternatives:
         named.append(effect_table("What explains these data as well, in its place", found.alternatives))
@@ -76,7 +82,7 @@ def write_diagnosis_report(
     ]
     sections = [
         paragraph(f"{', '.join(recordings)}; diagnosed in {found.seconds:.0f} s"),
-        card(ACCENTS[found.verdict], *(paragraph(text) for text in verdict if text)),
+        card(ACCENTS[found.verdict], *map(paragraph, words.answer(found))),
     ]
     if named:
         sections.append(
@@ -88,17 +94,25 @@ def write_diagnosis_report(
                 bullets(looks),
             )
         )
-    if found.where:
+    if found.verdict != "nothing_missing" and found.where:
         sections.append(section("Where", tables([where_table(found)])))
     sections += [
-        section("The gap, before and after", shown("gap"), tables([gap_table(found)])),
+        section("The gap, before and after", paragraph(GAP), shown("gap"), tables([gap_table(found)])),
         section("Measured and predicted, on held-out data", paragraph(PREDICTIONS), shown("prediction")),
     ]
     if found.forces_before:
         where = words.equation(found.forces_before[0].equation)
-        sections.append(section(f"What is missing in {where}", paragraph(FORCES), shown("force")))
+        sections.append(
+            section(
+                f"The force that would make the model right, in {where}", paragraph(FORCES), shown("force")
+            )
+        )
     sections += [
-        section("Parameters", tables([calibrated_table(found, file)])),
+        section(
+            "Calibrated parameters",
+            paragraph(f"{PARAMETERS} {far_moved(found, file)}"),
+            tables([calibrated_table(found, file)]),
+        ),
         section("What to measure next", paragraph(found.next_experiment)),
         section("The recordings", bullets(found.notes or ["Nothing had to be repaired or left out."])),
     ]

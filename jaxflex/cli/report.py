@@ -34,6 +34,10 @@ figure p, .note { color: var(--soft); font-size: .9rem; margin: .4rem 0; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .88rem; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 .words { text-align: left; }
+@media (max-width: 32rem) {
+  th, td { padding: .25rem .35rem; }
+  .words { white-space: normal; }
+}
 tr.best td { background: var(--best); font-weight: 600; }
 """
 
