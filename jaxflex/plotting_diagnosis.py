@@ -19,8 +19,9 @@ WIDTH = 5.0  # inches: legible across a telephone, two side by side across a des
 BINS = 30
 FEWEST = 4  # points that a bin's mean is drawn from
 TAILS = (0.5, 99.5)  # per cent: what lies outside is left out of a picture of a force
+MOST = 2.0  # heights of the force before that the one after may add to its picture
 SMOOTHED = 5  # neighbours that a spectrum is averaged over
-PROMINENCE = 0.8  # decades that a peak stands above both of its sides
+PROMINENCE = 1.0  # decades that a peak stands above both of its sides
 POINTS = 1500  # drawn of a cloud
 
 
@@ -140,7 +141,10 @@ def plot_force(view: View, before: LatentForce, after: LatentForce) -> Figure:
     ):
         _cloud(axis, place, force.values, edges, colour, label)
     axis.set_xlim(edges[0], edges[-1])
-    axis.set_ylim(*_spread(np.concatenate([before.values, after.values])))
+    low, high = _spread(before.values)
+    lowest, highest = _spread(np.concatenate([before.values, after.values]))
+    room = MOST * (high - low)  # an estimate that ran away must not hide the other
+    axis.set_ylim(max(lowest, low - room), min(highest, high + room))
     axis.axhline(0.0, color="0.4", linewidth=0.6)
     axis.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
     axis.set_xlabel(view.axis)

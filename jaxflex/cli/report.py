@@ -32,7 +32,8 @@ figure p, .note { color: var(--soft); font-size: .9rem; margin: .4rem 0; }
 .card > :last-child { margin-bottom: 0; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .88rem; }
-th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap;
+         vertical-align: top; }
 .words { text-align: left; }
 @media (max-width: 32rem) {
   th, td { padding: .25rem .35rem; }
