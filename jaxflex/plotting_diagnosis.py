@@ -161,17 +161,20 @@ def plot_force_spectrum(before: LatentForce, after: LatentForce) -> Figure:
     for force, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
         times = np.linspace(force.times[0], force.times[-1], len(force.times))
         f, density = map(np.asarray, spectrum(jnp.asarray(times), jnp.asarray(force.values)))
-        f, density = f[1:], np.convolve(density[1:], np.full(SMOOTHED, 1 / SMOOTHED), "same")
-        if not np.all(density > 0):
+        f, density = f[1:], density[1:]
+        smooth = np.convolve(density, np.full(SMOOTHED, 1 / SMOOTHED), "same")
+        if not np.all(smooth > 0):
             continue
-        axis.semilogy(f, density, color=colour, linewidth=1.0, label=label)
-        peaks, found = find_peaks(np.log10(density), prominence=PROMINENCE)
+        axis.semilogy(f, smooth, color=colour, linewidth=1.0, label=label)
+        peaks, found = find_peaks(np.log10(smooth), prominence=PROMINENCE)
         for peak in peaks[np.argsort(-found["prominences"])][:3]:
-            if any(abs(f[peak] - other) < 0.13 * f[-1] for other in labelled):
+            near = slice(max(peak - SMOOTHED // 2, 0), peak + SMOOTHED // 2 + 1)
+            line = float(f[near][np.argmax(density[near])])
+            if any(abs(line - other) < 0.13 * f[-1] for other in labelled):
                 continue
-            labelled.append(float(f[peak]))
+            labelled.append(line)
             axis.annotate(
-                f"{f[peak]:.1f} Hz", (f[peak], density[peak]), xytext=(0, 5),
+                f"{line:.1f} Hz", (line, smooth[peak]), xytext=(0, 5),
                 textcoords="offset points", ha="center", fontsize=8, color=colour,
             )  # fmt: skip
     axis.set_xlabel("frequency [Hz]")

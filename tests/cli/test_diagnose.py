@@ -1,7 +1,11 @@
 import dataclasses
 import json
 import math
+import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +23,7 @@ from jaxflex.effects import CoulombFriction
 from jaxflex.files.tables import write_series
 from jaxflex.plotting_diagnosis import VIEWS, plot_force, plot_force_spectrum, plot_gap
 
+ROOT = Path(__file__).resolve().parents[2]
 FRICTION, FREQUENCY = 0.01, 12.0  # N m, Hz
 
 COULOMB = NamedEffect(
@@ -210,9 +215,8 @@ def test_bad_input_is_one_line_and_status_two(arguments, message, tmp_path, monk
 
 
 @pytest.mark.slow
-def test_from_recordings_to_an_arm_that_predicts_them(tmp_path, monkeypatch):
+def test_from_recordings_to_an_arm_that_predicts_them(tmp_path):
     """A motor axis with Coulomb friction hidden in it; the readings have noise of known size."""
-    monkeypatch.setenv("JAXFLEX_CACHE", str(tmp_path / "cache"))
     (tmp_path / "arm.toml").write_text(
         "[[joint]]\nhub_inertia = 1e-3\nviscous_friction = 2e-3\n[drive]\ninput = 'torque'\n"
     )
@@ -227,9 +231,18 @@ def test_from_recordings_to_an_arm_that_predicts_them(tmp_path, monkeypatch):
         write_series(tmp_path / f"run_{seed}.csv", times, {"torque_1": torque, "angle_1": angle})
     files = [str(tmp_path / name) for name in ("arm.toml", "run_1.csv", "run_2.csv")]
     same = tmp_path / "same.json"
-    result = CliRunner().invoke(app, ["diagnose", *files, "-o", str(tmp_path / "d"), "--json", str(same)])
-    assert result.exit_code == 0, result.output
-    assert "Coulomb friction" in result.output
+    program = [sys.executable, "-m", "jaxflex", "diagnose", *files, "-o", str(tmp_path / "d")]
+    environment = os.environ | {"JAXFLEX_CACHE": str(tmp_path / "cache")}
+    result = subprocess.run(
+        [*program, "--json", str(same)],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert "Coulomb friction" in result.stdout
     found = json.loads((tmp_path / "d" / "report.json").read_text())
     assert found == json.loads(same.read_text())
     assert found["effects"][0]["name"] == "coulomb_friction"
