@@ -4,8 +4,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..diagnosis.diagnose import diagnose as find
-from ..diagnosis.result import Diagnosis
+from ..diagnosis import Diagnosis
+from ..diagnosis import diagnose as find
 from ..files.arm_file import ArmFile, read_arm_file, save_arm
 from ..files.read_recording import read_recording
 from . import words
