@@ -5,13 +5,14 @@ from typing import Annotated, Optional
 
 import typer
 
+from .cli.diagnose import diagnose as diagnose_command
 from .cli.modes import modes as modes_command
 from .cli.runtime import command
 from .cli.simulate import simulate as simulate_command
 from .cli.tune import tune as tune_command
 
 app = typer.Typer(
-    help="Flexible-link robot arms driven by DC motors: model, simulate, tune.",
+    help="Flexible-link robot arms driven by DC motors: model, simulate, tune, diagnose.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
@@ -65,6 +66,17 @@ def modes(
 ) -> None:
     """Natural frequencies with joints free, locked and controlled, against payload."""
     command(modes_command)(arm, payloads, pose, json, output)
+
+
+@app.command()
+def diagnose(
+    arm: Annotated[Path, typer.Argument(metavar="ARM", help="arm.toml of the nominal arm.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Recordings of it (CSV).")],
+    json: Json = None,
+    output: Output = None,
+) -> None:
+    """Find where the model and measured runs disagree, name the missing effect, and add it."""
+    command(diagnose_command)(arm, runs, json, output)
 
 
 def main() -> None:

@@ -26,7 +26,8 @@ TITLES = {
 BEFORE, AFTER = "#c44e52", "#2a6f97"
 
 
-def _figure(rows: int, columns: int, height: float = 2.6, width: float = 9.0):
+def panels(rows: int, columns: int, height: float = 2.6, width: float = 9.0):
+    """An empty figure of panels that share their time or frequency axis; sizes in inches."""
     figure = Figure(figsize=(width, height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for axis in axes.flat:
@@ -47,7 +48,7 @@ def plot_trajectory(trajectory: Trajectory, title: str = "") -> Figure:
         groups.setdefault("tip" if name in ("tip_x", "tip_y") else name.rpartition("_")[0], []).append(name)
     order = ("angle", "tip_deflection", "tip", "voltage", "current", "torque", "rate", "strain")
     shown = [kind for kind in order if kind in groups]
-    figure, axes = _figure((len(shown) + 1) // 2, 2)
+    figure, axes = panels((len(shown) + 1) // 2, 2)
     times = np.asarray(trajectory.times)
     for axis, kind in zip(axes.flat, shown, strict=False):
         for i, name in enumerate(sorted(groups[kind])):
@@ -87,7 +88,7 @@ def plot_before_after(
     `before`, `after`: `(payloads, times, links)` [m]; `ends` [s] of the commanded moves.
     """
     links = before.shape[-1]
-    figure, axes = _figure(links, 2, height=2.8)
+    figure, axes = panels(links, 2, height=2.8)
     for column, (runs, end, label) in enumerate(zip((before, after), ends, labels, strict=True)):
         for row in range(links):
             axis: Axes = axes[row, column]
@@ -114,7 +115,7 @@ def plot_residual(
     payloads: np.ndarray, residual: Mapping[str, np.ndarray], tuned: str, tuned_on: Sequence[float]
 ) -> Figure:
     """Residual vibration [m] against payload [kg] for every design, the tuning payloads marked."""
-    figure, axes = _figure(1, 1, height=4.6)
+    figure, axes = panels(1, 1, height=4.6)
     axis = axes[0, 0]
     for i, (name, values) in enumerate(residual.items()):
         best = name == tuned
@@ -148,7 +149,7 @@ def plot_spectra(
 
     `before`, `after`: `(payloads, frequencies)`; shown up to `top` [Hz].
     """
-    figure, axes = _figure(1, 1, height=3.8)
+    figure, axes = panels(1, 1, height=3.8)
     axis = axes[0, 0]
     shown = (frequencies > 0) & (frequencies <= top)
     f = frequencies[shown]
@@ -186,7 +187,7 @@ def strongest_peaks(f: np.ndarray, density: np.ndarray, count: int) -> list[int]
 
 def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figure:
     """Natural frequencies [Hz] against payload [kg]; `families`: title to `(payloads, modes)`."""
-    figure, axes = _figure(1, len(families), height=3.8)
+    figure, axes = panels(1, len(families), height=3.8)
     for axis, (title, values) in zip(axes[0], families.items(), strict=True):
         for j in range(values.shape[1]):
             if np.all(values[:, j] <= 0):
@@ -208,7 +209,7 @@ def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figu
 
 def plot_history(histories: Sequence[Sequence[float]]) -> Figure:
     """Cost of the best design so far against the step, for every descent."""
-    figure, axes = _figure(1, 1, height=3.0, width=6.0)
+    figure, axes = panels(1, 1, height=3.0, width=6.0)
     for number, history in enumerate(histories, 1):
         axes[0, 0].plot(np.arange(1, len(history) + 1), history, label=f"descent {number}")
     axes[0, 0].set_xlabel("step")

@@ -14,12 +14,13 @@ from rich.table import Table as RichTable
 
 @dataclass
 class Table:
-    """Rows of text under `columns`; the first column is left-aligned, the row `best` stands out."""
+    """Rows of text under `columns`; the first `words` are left-aligned, the row `best` stands out."""
 
     title: str
     columns: Sequence[str]
     rows: list[Sequence[str]] = field(default_factory=list)
     best: str | None = None
+    words: int = 1
 
     def rich(self) -> RichTable:
         """For the terminal."""
@@ -27,22 +28,27 @@ class Table:
             title=escape(self.title), title_justify="left", title_style="bold", box=None, padding=(0, 1, 0, 0)
         )
         for i, column in enumerate(self.columns):
-            table.add_column(escape(column), justify="left" if i == 0 else "right", no_wrap=True)
+            table.add_column(escape(column), justify="left" if i < self.words else "right", no_wrap=True)
         for row in self.rows:
             table.add_row(*row, style="bold green" if row[0] == self.best else None)
         return table
 
     def html(self) -> str:
         """For the report."""
-        head = "".join(f"<th>{html.escape(c)}</th>" for c in self.columns)
+
+        def cells(tag: str, texts: Sequence[str]) -> str:
+            kinds = [" class='words'" if i < self.words else "" for i in range(len(texts))]
+            return "".join(
+                f"<{tag}{kind}>{html.escape(text)}</{tag}>" for kind, text in zip(kinds, texts, strict=True)
+            )
+
         body = ""
         for row in self.rows:
             mark = ' class="best"' if row[0] == self.best else ""
-            cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row)
-            body += f"<tr{mark}>{cells}</tr>\n"
+            body += f"<tr{mark}>{cells('td', row)}</tr>\n"
         return (
             f"<figure><figcaption>{html.escape(self.title)}</figcaption><div class='scroll'>"
-            f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div></figure>"
+            f"<table><thead><tr>{cells('th', self.columns)}</tr></thead><tbody>{body}</tbody></table></div></figure>"
         )
 
 

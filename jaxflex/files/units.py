@@ -1,4 +1,4 @@
-"""Units that a recording may be written in, and what they are in SI."""
+"""Units that a recording may be written in and what they are in SI; units of an arm's parameters."""
 
 import math
 
@@ -28,3 +28,30 @@ def factor(given: str, wanted: str) -> float | None:
         if base == wanted and given.endswith(base):
             return _PREFIXES.get(given[: len(given) - len(base)].strip())
     return None
+
+
+_PARAMETERS = {
+    "length": "m",
+    "width": "m",
+    "thickness": "m",
+    "youngs_modulus": "Pa",
+    "density": "kg/m^3",
+    "mass_per_length": "kg/m",
+    "flexural_rigidity": "N m^2",
+    "damping_ratio": "1",
+    "hub_inertia": "kg m^2",
+    "hub_mass": "kg",
+    "viscous_friction": "N m s/rad",
+    "rotor_inertia": "kg m^2",
+    "resistance": "ohm",
+    "inductance": "H",
+    "torque_constant": "N m/A",
+    "back_emf_constant": "V s/rad",
+    "payload_mass": "kg",
+    "payload_inertia": "kg m^2",
+}
+
+
+def parameter_unit(name: str) -> str:
+    """Unit of a nominal parameter such as `density` or `hub_inertia_2`; raises `KeyError` if unknown."""
+    return _PARAMETERS[name.rstrip("0123456789").removesuffix("_")]
