@@ -50,8 +50,15 @@ def judge(folder: Path) -> dict[str, Any]:
     }
 
 
+def _without_company(hidden: list[str], named: list[str]) -> list[str]:
+    """The blind plants' Stribeck and asymmetric friction sit on a Coulomb level, which may be named too."""
+    sits_on_level = {"stribeck_friction", "asymmetric_friction"} & set(hidden)
+    return [name for name in named if not (sits_on_level and name == "coulomb_friction")]
+
+
 def right(hidden: list[str], verdict: str, named: list[str], others: list[str]) -> bool:
     """True if the answer is the right one for what is hidden."""
+    named = _without_company(hidden, named)
     if not hidden:
         return verdict == "nothing_missing"
     if any(name.startswith("outside:") for name in hidden):

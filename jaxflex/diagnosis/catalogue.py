@@ -64,7 +64,7 @@ def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
         return 0.3 < step[0] < 3.0
     anything = (-np.inf, np.inf) if candidate.effect in EITHER_SIGN else (0.0, np.inf)
     low, high = BOUNDS.get(candidate.effect, anything)
-    return all(low <= value <= high for value in step)
+    return all(low <= value <= high for value in step[: len(candidate.amplitudes)])
 
 
 def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float]) -> list[AbstractEffect]:
@@ -133,7 +133,7 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
         elif name == "gravity":
             yield Candidate(name, location, ("along_y", "along_x"))
         elif name == "cable_stiffness":
-            yield Candidate(name, location, ("stiffness",))
+            yield Candidate(name, location, ("stiffness",), (("rest_angle", 0.0),), ("rest_angle",))
         elif name in ("coulomb_friction", "asymmetric_friction"):
             shape = (("transition_rate", float(effect.transition_rate)),)
             yield Candidate(name, location, ("torque",), shape, ("transition_rate",))
@@ -211,7 +211,12 @@ class Motion:
         shape = dict(candidate.shape)
         if issubclass(kind, AbstractJointEffect):
             base = next(e for e in self.parameters.effects if (e.name, e.location) == candidate.key)
-            columns = []
+            columns, rest = [], []
+            if candidate.effect == "cable_stiffness":
+                # its rest angle enters as a constant torque
+                column = blank.copy()
+                column[..., joints + joint] = 1.0
+                rest = [column]
             for amplitude in candidate.amplitudes:
                 options = {f: getattr(base, f) for f in kind.units} | shape
                 options |= dict.fromkeys(candidate.amplitudes, 0.0) | {amplitude: 1.0}
@@ -223,7 +228,7 @@ class Motion:
                 column = blank.copy()
                 column[..., joints + joint] = np.asarray(torque).mean(0)
                 columns.append(column)
-            return np.stack(columns)
+            return np.stack(columns + rest)
         command = self.command[..., joint]
         column = blank.copy()
         if candidate.effect == "voltage_dead_zone":

@@ -17,11 +17,13 @@ from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .hypothesis import HORIZONS, Hypothesis, Outcome, Search, freedom
 from .locate import LatentForce, regimes
+from .next_experiment import advice
 from .prepare import Prepared
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem, Run
 
 AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
+CLOSE = 2.0  # misfit a reading up to which a fit is trusted with the parameters
 MOSTLY = 0.6  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]
@@ -65,7 +67,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
             "root mean square error of predictions over 1 s from estimated starts",
             True, before[0], after[0], prepared.floor,
         ),
-        next_experiment=_next(verdict, effects, alternatives, forces_after),
+        next_experiment=_next(verdict, search, outcome, forces_after),
         calibrated={part.name: estimates[i] for i, part in enumerate(parameters.nominal)},
         improved=improved,
         explained=float(np.clip(gone, 0.0, 1.0)),
@@ -105,13 +107,17 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
 def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothesis:
     """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
     final = outcome.final
-    if any(effect.effect == "periodic_disturbance" for effect in final.effects) or final.horizon < HORIZON:
+    if any(effect.effect == "periodic_disturbance" for effect in final.effects):
         return final
+    # the longest horizon over which the model still follows: beyond it, parameters would
+    # be bent to make up for what it does not know
+    followed = [h for h, cost in final.costs.items() if cost < CLOSE * final.fit.count]
+    horizon = max(followed, default=HORIZONS[0])
     runs = [*prepared.calibration, *prepared.held_out]
     search.restart(outcome.final_starts)
     free = freedom(search.parameters, final.effects)
-    found = fit(prepared.problem, runs, final.fit.vector, free, HORIZON, 3)
-    return Hypothesis(final.effects, found, HORIZON, {HORIZON: found.cost})
+    found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3)
+    return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
 
 
 def _noise(problem: Problem) -> dict[str, float]:
@@ -185,9 +191,7 @@ def _where(
     return tuple(Place(c, equation, regime, excess[c] / total) for c in order if excess[c] > 0.01 * total)
 
 
-def _next(
-    verdict: str, effects: tuple[NamedEffect, ...], alternatives: list[NamedEffect], forces: list[LatentForce]
-) -> str:
+def _next(verdict: str, search: Search, outcome: Outcome, forces: list[LatentForce]) -> str:
     if verdict == "nothing_missing":
         return "None needed: the model predicts what was measured down to its noise."
     if verdict == "unexplained":
@@ -197,9 +201,10 @@ def _next(
             f"({share:.0%} of it). Repeat the run twice as large and at half the speed: what scales with "
             "the motion is in the arm, what does not is outside of it."
         )
-    if alternatives:
-        names = " from ".join([effects[0].name, *(a.name for a in alternatives)])
-        return f"An experiment that tells {names}: see the separation of each in the report."
+    if outcome.rivals:
+        place, rival = outcome.rivals[0]
+        search.restart(outcome.final_starts)
+        return advice(search, outcome.final, outcome.final.effects[place], rival.effects[-1])
     return "Repeat the run with another payload: the same effect with the same size confirms it."
 
 

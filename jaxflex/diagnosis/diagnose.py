@@ -19,7 +19,7 @@ SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
-HALF = 0.4  # of a larger one that an effect has to explain
+HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.03  # of the gain: what a hypothesis with more parameters must be better by
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 

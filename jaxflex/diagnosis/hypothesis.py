@@ -22,6 +22,7 @@ MODEL_ERROR = 0.002
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
+INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 BARRED = 1e20  # precision that keeps a parameter where it is
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
@@ -83,9 +84,9 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
         for name in effect.free:
             value = dict(effect.shape)[name]
             columns.append(parameters.position(*effect.key, name))
-            precision.append(1 / (0.5 * value) ** 2)
+            precision.append(1 / (0.5 * value if value else 1.0) ** 2)
             centre.append(value)
-            lowest.append(0.1 * value)
+            lowest.append(0.1 * value if value else -np.inf)
     return Freedom(tuple(columns), np.array(precision), np.array(centre), np.array(lowest))
 
 
@@ -98,6 +99,8 @@ def adopt(
         vector[parameters.position(*candidate.key, name)] = value
     for name, value in zip(candidate.amplitudes, step, strict=False):
         vector[parameters.position(*candidate.key, name)] = value
+    if candidate.effect == "cable_stiffness" and len(step) > 1:
+        vector[parameters.position(*candidate.key, "rest_angle")] = step[1] / step[0]
     return vector
 
 
@@ -201,7 +204,7 @@ class Search:
                 precision[own] = BARRED
                 pull = np.where(np.isin(np.arange(len(columns)), own), 0.0, pull)
             for score in scores(normal, precision, pull, len(columns), tried, linears[0][1]):
-                if not plausible(score.candidate, score.step):
+                if score.survival < INVISIBLE or not plausible(score.candidate, score.step):
                     continue
                 strength = score.gain / allowance(normal.count, horizon)
                 kept = best.get(score.candidate.key)

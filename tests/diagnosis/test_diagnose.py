@@ -1,0 +1,94 @@
+"""The whole workflow on data in which the effect is hidden, made by plants of another making."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jaxflex as jf
+from experiments.blind.make import make_cases, write_case
+from jaxflex.diagnosis import diagnose
+
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+
+
+def answer(folder):
+    recordings = [jf.read_recording(path) for path in sorted(folder.glob("run_*.csv"))]
+    return diagnose(jf.read_arm_file(folder / "arm.toml"), recordings)
+
+
+@pytest.fixture(scope="module")
+def hidden(tmp_path_factory):
+    """Three blind cases: a cable, a slow instrument, nothing."""
+    folder = tmp_path_factory.mktemp("cases")
+    cases = make_cases("single_link", [("cable_stiffness",), ("sensor_lag",), ()], [10.0], [0])
+    for case in cases:
+        write_case(case, folder / case.name)
+    return {(case.truth[0][0] if case.truth else "nothing"): (folder / case.name, case) for case in cases}
+
+
+@pytest.mark.parametrize("name", ["cable_stiffness", "sensor_lag"])
+def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
+    folder, case = hidden[name]
+    found = answer(folder)
+    assert found.verdict in ("missing_effect", "ambiguous")
+    assert name in [e.name for e in (*found.effects, *found.alternatives)]
+    for channel, floor in found.gap.noise_floor.items():
+        assert found.gap.after[channel] < 1.25 * floor
+    assert max(found.gap.before[c] / f for c, f in found.gap.noise_floor.items()) > 1.5
+    ((_, location, truth),) = case.truth
+    first = found.effects[0]
+    if first.name == name:
+        assert first.location == location
+        for key, value in truth.items():
+            estimate = first.parameters[key]
+            assert abs(estimate.value - value) < max(3 * estimate.std, 0.1 * abs(value))
+    json.dumps(found.to_json())
+    assert [e.name for e in found.improved.effects] == [e.name for e in found.effects]
+
+
+def test_nothing_hidden_is_nothing_missing(hidden):
+    found = answer(hidden["nothing"][0])
+    assert found.verdict == "nothing_missing" and not found.effects
+
+
+def shared(*parts):
+    folder = SHARED.joinpath(*parts)
+    if not folder.exists():
+        pytest.skip(f"needs {'/'.join(parts)} of the shared recordings, which are not here")
+    return folder
+
+
+def test_friction_of_a_measured_axis():
+    """EMPS (Janot et al. 2019): published M = 95.1 kg, Fc = 20.4 N, and an offset."""
+    found = answer(shared("data", "emps"))
+    assert found.effects[0].name == "coulomb_friction"
+    assert found.effects[0].parameters["torque"].value == pytest.approx(20.4, rel=0.1)
+    assert found.calibrated["hub_inertia"].value == pytest.approx(95.1, rel=0.05)
+    assert found.gap.after["angle_1"] < 0.4 * found.gap.before["angle_1"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "case, names",
+    [
+        ("a_nothing", []),
+        ("b", ["coulomb_friction"]),
+        ("c", ["payload_mass"]),
+        ("d", ["cable_stiffness"]),
+        ("e", ["sensor_lag"]),
+        ("f", ["coulomb_friction", "cable_stiffness"]),
+    ],
+)
+def test_recordings_of_an_unrelated_simulator(case, names):
+    found = answer(shared("cases", case))
+    assert sorted(e.name for e in found.effects) == sorted(names)
+
+
+def test_a_recording_without_its_input_is_refused():
+    t = np.linspace(0, 2, 1001)
+    recording = jf.Recording(t, {"angle_1": np.sin(t)}, ())
+    arm = jf.Arm((), (jf.Joint(hub_inertia=1.0),))
+    with pytest.raises(jf.RecordingError, match="torque_1"):
+        diagnose(jf.ArmFile(arm, {}, None), [recording])
