@@ -39,6 +39,10 @@ from .control import AbstractReference as AbstractReference
 from .control import Measurement as Measurement
 from .control import Setpoint as Setpoint
 
+# Diagnosis
+from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import diagnose as diagnose
+
 # Dynamics by autodiff of T - U
 from .dynamics.lagrange import coriolis_matrix as coriolis_matrix
 from .dynamics.lagrange import gravity_vector as gravity_vector

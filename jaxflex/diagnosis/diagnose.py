@@ -18,6 +18,7 @@ STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain wo
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
+LITTLE = 0.01  # of the gap there was: what may be left over a second where a tenth of one is followed
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.03  # of the gain: what a hypothesis with more parameters must be better by
@@ -52,6 +53,7 @@ def find(search: Search) -> Outcome:
     settled_starts = search.starts()
     base, base_starts = Hypothesis((), settled, 1, {1: settled.cost}), settled_starts
     outcome: Outcome | None = None
+    levels: list[float] = []
     for _ in range(MOST_EFFECTS + 1):
         fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
         starts = search.starts()
@@ -61,6 +63,10 @@ def find(search: Search) -> Outcome:
         if outcome is None:
             outcome = Outcome(fitted, starts)
         outcome.final, outcome.final_starts = fitted, starts
+        levels.append(search.over_a_second(fitted))
+        near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
+        if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1):
+            break
         horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
         ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
         far = fitted.fit.level > CLOSE and fitted.horizon == HORIZONS[0]

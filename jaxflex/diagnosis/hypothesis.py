@@ -154,6 +154,15 @@ class Search:
         assert found is not None
         return Hypothesis(effects, found, max(costs), costs)
 
+    def over_a_second(self, hypothesis: Hypothesis) -> float:
+        """Misfit a reading over the longest horizon, whether or not it was fitted there."""
+        if hypothesis.horizon == HORIZONS[-1]:
+            return hypothesis.fit.level
+        starts = self.starts()
+        level = self.settle(hypothesis.fit.vector, HORIZONS[-1]).level
+        self.restart(starts)
+        return level
+
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
         return latent_forces(self.problem, self.runs[0], vector, horizon)
