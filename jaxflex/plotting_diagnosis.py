@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from scipy.signal import find_peaks
 
 from .analysis.measures import spectrum
@@ -176,6 +177,7 @@ def plot_force_spectrum(before: LatentForce, after: LatentForce) -> Figure:
             axis.annotate(
                 f"{line:.1f} Hz", (line, smooth[peak]), xytext=(0, 5),
                 textcoords="offset points", ha="center", fontsize=8, color=colour,
+                path_effects=[withStroke(linewidth=3, foreground="white")], zorder=5,
             )  # fmt: skip
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel(f"density [({before.unit})²/Hz]")
