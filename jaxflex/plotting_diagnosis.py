@@ -167,8 +167,10 @@ def plot_force_spectrum(before: LatentForce, after: LatentForce) -> Figure:
         if not np.all(smooth > 0):
             continue
         axis.semilogy(f, smooth, color=colour, linewidth=1.0, label=label)
-        peaks, found = find_peaks(np.log10(smooth), prominence=PROMINENCE)
-        for peak in peaks[np.argsort(-found["prominences"])][:3]:
+        # padded, so that a peak at the lowest frequencies has a foot on either side
+        level = np.pad(np.log10(smooth), 1, constant_values=np.log10(smooth.min()))
+        peaks, found = find_peaks(level, prominence=PROMINENCE)
+        for peak in (peaks - 1)[np.argsort(-found["prominences"])][:3]:
             near = slice(max(peak - SMOOTHED // 2, 0), peak + SMOOTHED // 2 + 1)
             line = float(f[near][np.argmax(density[near])])
             if any(abs(line - other) < 0.13 * f[-1] for other in labelled):
