@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .shooting import Linearised, Normal, Problem, Run
+from .shooting import Linearised, Normal, Problem, Run, solve
 
 CHORDS = 5  # steps with the same slopes; each needs only a run of the model
 MOST = 15  # iterations, however well they do
@@ -93,7 +93,10 @@ def fit(
                 matrix = current.matrix + np.diag(freedom.precision)
                 matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
                 pull = current.vector - freedom.precision * (vector[columns] - freedom.centre)
-                step = np.linalg.solve(matrix, pull) if columns else np.zeros(0)
+                step = solve(matrix, pull) if columns else np.zeros(0)
+                if not np.isfinite(step).all():
+                    cost = np.inf
+                    break
                 step = np.maximum(vector[columns] + step, freedom.lowest) - vector[columns]
                 problem.move_starts(current, step)
                 vector[columns] += step

@@ -55,7 +55,7 @@ EITHER_SIGN = {
     "sensor_bias", "sensor_gain", "sensor_drift",
 }  # fmt: skip
 # and where they make sense only within bounds
-BOUNDS = {"centrifugal_stiffening": (0.3, 3.0), "sensor_gain": (-0.5, 0.5)}
+BOUNDS = {"centrifugal_stiffening": (0.3, 30.0), "sensor_gain": (-0.5, 0.5)}
 
 
 def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
@@ -221,12 +221,12 @@ class Motion:
                 options = {f: getattr(base, f) for f in kind.units} | shape
                 options |= dict.fromkeys(candidate.amplitudes, 0.0) | {amplitude: 1.0}
                 effect = kind(location=candidate.location, **options)
-                at = jnp.asarray(time + self.dt / 2)
-                torque = jax.vmap(lambda a, r, e=effect, at=at: e(a, r, at))(
-                    jnp.asarray(self.angle(joint)), jnp.asarray(self.rate(joint))
-                )
+                angle, rate = self.angle(joint), self.rate(joint)
+                at = np.broadcast_to(time + self.dt / 2, angle.shape)
+                flat = jax.vmap(effect)(*(jnp.asarray(v.ravel()) for v in (angle, rate, at)))
+                torque = np.asarray(flat).reshape(angle.shape)
                 column = blank.copy()
-                column[..., joints + joint] = np.asarray(torque).mean(0)
+                column[..., joints + joint] = torque.mean(0)
                 columns.append(column)
             return np.stack(columns + rest)
         command = self.command[..., joint]

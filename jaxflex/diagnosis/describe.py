@@ -12,6 +12,7 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.base import AbstractSensorEffect
 from ..files.arm_file import ArmFile
+from ..files.units import parameter_unit
 from ..sensors import unit
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
@@ -146,7 +147,7 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
         if column < len(parameters.nominal):
             part = parameters.nominal[column]
             size = part.value * float(np.exp(part.spread * value))
-            estimates[column] = Estimate(size, size * part.spread * float(std), "SI")
+            estimates[column] = Estimate(size, size * part.spread * float(std), parameter_unit(part.name))
         else:
             part = parameters.effect[column - len(parameters.nominal)]
             whole = float(np.hypot(std, OWN_ERROR * value))
@@ -217,7 +218,14 @@ def _with_outside(file: ArmFile, search: Search, arm, effects: tuple[Candidate, 
             field: float(vector[search.parameters.position(*effect.key, field)]) for field in kind.units
         }
         kept.append(kind(location=effect.location, **values))
-    return dataclasses.replace(arm, effects=tuple(kept))
+    joints = []
+    for own, given in zip(arm.joints, file.arm.joints, strict=True):
+        # a winding too fast for the samples is put back
+        motor = own.motor
+        if motor is not None and motor.inductance is None and given.motor.inductance is not None:
+            motor = dataclasses.replace(motor, inductance=given.motor.inductance)
+        joints.append(dataclasses.replace(own, motor=motor))
+    return dataclasses.replace(arm, joints=tuple(joints), effects=tuple(kept))
 
 
 def _comparison(prepared: Prepared, before: list, after: list) -> Comparison:

@@ -64,6 +64,9 @@ def find(search: Search) -> Outcome:
             outcome = Outcome(fitted, starts)
         outcome.final, outcome.final_starts = fitted, starts
         levels.append(search.over_a_second(fitted))
+        short = outcome.nominal.costs[HORIZONS[0]] - fitted.costs[HORIZONS[0]]
+        long = (levels[0] - levels[-1]) * fitted.fit.count
+        explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
         near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
         if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1):
             break
@@ -84,7 +87,7 @@ def find(search: Search) -> Outcome:
         for item in tried:
             horizon = fitted.horizon
             found = search.confirm(before, before_starts, item, horizon)
-            confirmed.append((found.strength(fitted), found, search.starts()))
+            confirmed.append((found.strength(fitted, explained), found, search.starts()))
             say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
         strength, best, best_starts = simplest(confirmed)
         if strength < STRONG or not _worth_it(fitted, best):
@@ -102,7 +105,7 @@ def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
     horizon = max(before.costs.keys() & after.costs.keys())
     count = before.fit.count
     left, gone = before.costs[horizon] / count - 1, (before.costs[horizon] - after.costs[horizon]) / count
-    return left < SMALL or gone > HALF * left
+    return bool(left < SMALL or gone > HALF * left)
 
 
 def simplest(confirmed: list[tuple[float, Hypothesis, list]]) -> tuple[float, Hypothesis, list]:

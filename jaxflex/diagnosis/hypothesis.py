@@ -23,6 +23,7 @@ CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
+FORM = 0.01  # of what an effect explains: what another form of it would explain better
 BARRED = 1e20  # precision that keeps a parameter where it is
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
@@ -36,11 +37,20 @@ class Hypothesis:
     horizon: int
     costs: dict[int, float]
 
-    def strength(self, other: "Hypothesis") -> float:
-        """By how much it beats another, in units of what noise and the model's own error may bring."""
+    def strength(self, other: "Hypothesis", explained: dict[int, float] | None = None) -> float:
+        """By how much it beats another, in units of what noise and the model's own error may bring.
+
+        `explained`: what effects already there have gained at each horizon; a share of it
+        may be due to the form that they were given.
+        """
         shared = self.costs.keys() & other.costs.keys()
+        already = explained or {}
         return max(
-            ((other.costs[h] - self.costs[h]) / allowance(self.fit.count, h) for h in shared), default=-np.inf
+            (
+                (other.costs[h] - self.costs[h]) / (allowance(self.fit.count, h) + FORM * already.get(h, 0.0))
+                for h in shared
+            ),
+            default=-np.inf,
         )
 
 

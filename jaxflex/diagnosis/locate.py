@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Motion
-from .shooting import Linearised, Problem, Run
+from .shooting import LOST, Linearised, Problem, Run, solve
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece
@@ -118,13 +118,15 @@ def _estimate(
         gram = table.T @ table
         a = slice(0, states)
         inner = gram[a, a] + np.diag(1 / problem.setting.start_spread**2)
-        gram = gram[states:, states:] - gram[states:, a] @ np.linalg.solve(inner, gram[a, states:])
+        gram = gram[states:, states:] - gram[states:, a] @ solve(inner, gram[a, states:])
+        if not np.isfinite(gram).all() or np.abs(gram).max() > LOST:
+            gram = np.zeros_like(gram)  # nothing can be said of a motion that left all bounds
         systems.append(gram)
     # the prior's standard deviation by evidence, on a grid of half decades
     typical = np.median([np.median(np.diag(g)[:-1]) for g in systems])
     spectra = [(*np.linalg.eigh(g[:-1, :-1]), g[:-1, -1]) for g in systems]
     best = (0.0, 0.0)
-    for spread in np.logspace(-2, 6, 17) / np.sqrt(max(typical, 1e-300)):
+    for spread in np.logspace(-2, 4, 13) / np.sqrt(max(typical, 1e-300)):
         gain = 0.0
         for values, vectors, right in spectra:
             seen = 1 + np.clip(values, 0, None) * spread**2

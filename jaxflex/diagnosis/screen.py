@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Candidate, Motion
-from .shooting import Linearised, Normal, Problem, Run
+from .shooting import Linearised, Normal, Problem, Run, solve
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def scores(
     base = slice(0, columns)
     matrix = normal.matrix[base, base] + np.diag(prior)
     vector = normal.vector[base] + pull
-    solved = np.linalg.solve(matrix, np.column_stack([normal.matrix[base], vector]))
+    solved = solve(matrix, np.column_stack([normal.matrix[base], vector]))
     found = []
     for candidate, place in zip(candidates, places, strict=True):
         cross = normal.matrix[place, base]
@@ -85,7 +85,9 @@ def scores(
         right = normal.vector[place] - cross @ solved[:, -1]
         scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
         tidy = inner / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-        inverse = np.linalg.inv(tidy) / np.outer(scale, scale)
+        if not np.isfinite(tidy).all():
+            continue
+        inverse = np.linalg.pinv(tidy, hermitian=True) / np.outer(scale, scale)
         step = inverse @ right
         survival = float(np.sqrt(np.clip(np.diag(tidy), 0, None).max()))
         found.append(

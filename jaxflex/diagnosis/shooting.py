@@ -96,6 +96,22 @@ class Normal:
         )
 
 
+def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """`matrix^-1 right` of a symmetric matrix, or the smallest of its solutions where it is singular."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    tidy = matrix / np.outer(scale, scale)
+    tall = (right.T / scale).T
+    try:
+        found = np.linalg.solve(tidy, tall)
+    except np.linalg.LinAlgError:
+        found = np.full_like(tall, np.nan)
+    if not np.isfinite(found).all():
+        if not np.isfinite(tidy).all() or not np.isfinite(tall).all():
+            return np.full_like(tall, np.inf)
+        found = np.linalg.lstsq(tidy, tall, rcond=1e-13)[0]
+    return (found.T / scale).T
+
+
 def delayed(times: np.ndarray, command: np.ndarray, delay: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """A command held between samples, as its mean over each interval when late by `delay` [s]; and its slope."""
     knots = np.append(times, times[-1] + dt)
@@ -305,7 +321,7 @@ class Problem:
             a = slice(0, states)
             b = slice(states, states + columns)
             inner = gram[a, a] + np.diag(1 / s.start_spread**2 + damping * np.diag(gram[a, a]))
-            solved = np.linalg.solve(inner, gram[a, states:])
+            solved = solve(inner, gram[a, states:])
             total = total + Normal(
                 gram[b, b] - gram[b, a] @ solved[:, :-1],
                 gram[b, -1] - gram[b, a] @ solved[:, -1],

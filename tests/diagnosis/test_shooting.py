@@ -35,7 +35,7 @@ class Held(jf.AbstractReference):
 def nominal():
     motor = jf.DCMotor(1.2, 0.06, 0.06, inductance=3e-3)
     joint = jf.Joint(hub_inertia=1e-3, viscous_friction=1e-3, motor=motor)
-    link = jf.Link(0.4, 0.15, 0.7, damping_ratio=0.01, modes=1)
+    link = jf.Link(0.4, 0.15, 0.7, damping_ratio=0.01, modes=2)
     return jf.Arm((link,), (joint,), jf.Payload(0.02), drive="voltage")
 
 
