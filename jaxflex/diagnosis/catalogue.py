@@ -61,7 +61,7 @@ BOUNDS = {"centrifugal_stiffening": (0.3, 30.0), "sensor_gain": (-0.5, 0.5)}
 def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
     """False for a friction that pushes, a spring that drives away, a lag into the future."""
     if not candidate.amplitudes:
-        return 0.3 < step[0] < 3.0
+        return bool(0.3 < step[0] < 3.0)
     anything = (-np.inf, np.inf) if candidate.effect in EITHER_SIGN else (0.0, np.inf)
     low, high = BOUNDS.get(candidate.effect, anything)
     return all(low <= value <= high for value in step[: len(candidate.amplitudes)])

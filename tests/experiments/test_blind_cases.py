@@ -10,7 +10,7 @@ from experiments.blind.make import make_cases, with_peaks, write_case
 from experiments.blind.outside import CATALOGUE
 from experiments.blind.rigs import NOISE, true_rig
 from experiments.blind.sizes import COARSE, hide
-from jaxflex.files import arm_file, recording
+from jaxflex.files import arm_file, read_recording
 
 
 @pytest.mark.parametrize("plant", ["single_link", "two_link", "axis"])
@@ -50,7 +50,7 @@ def test_cases_are_as_asked(tmp_path):
     assert cases[2].gap["size"] < 0.05
     write_case(cases[0], tmp_path)
     assert arm_file.read_arm_file(tmp_path / "arm.toml").arm.joints[0].motor is not None
-    log = recording.read_recording(tmp_path / "run_2.csv")
+    log = read_recording.read_recording(tmp_path / "run_2.csv")
     assert set(log.channels) == {"voltage_1", "angle_1", "current_1", "tip_deflection_1"}
     assert log.repairs == ()
     difference = np.diff(log["current_1"], 4)[100:]
