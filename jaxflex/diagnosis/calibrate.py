@@ -58,7 +58,7 @@ def fit(
     """Minimise misfit over `horizon` pieces plus prior; the starts of the pieces move along.
 
     Ends when an iteration gains less than `tolerance` a reading, or, after `iterations`
-    of them, less than a tenth of the cost.
+    of them, less than the share SLOW of the cost.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -83,7 +83,7 @@ def fit(
     for iteration in range(MOST):
         linears = [problem.linearise(run, vector, columns) for run in runs]
         first = condensed(linears)
-        kept = keep(first.held + prior(vector), first)
+        kept = keep(first.cost + prior(vector), first)
         before = kept[0]
         if not np.isfinite(before):
             break
@@ -104,7 +104,7 @@ def fit(
                     current = condensed(
                         [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
                     )
-                new = current.held + prior(vector)
+                new = current.cost + prior(vector)
                 if not np.isfinite(new):
                     cost = np.inf
                     break

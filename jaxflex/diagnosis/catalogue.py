@@ -20,6 +20,7 @@ from ..drive import has_current_state
 from ..effects import EFFECTS, AbstractEffect, AbstractJointEffect
 from ..files.arm_file import places
 from .parameters import Parameters
+from .shooting import Problem, Run
 
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.5  # of a ripple that the motion must span
@@ -83,7 +84,7 @@ def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float])
 
 def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> bool:
     if name == "backlash":
-        return False  # it changes the number of states; see `Candidate`s of its own
+        return False  # it changes the number of states, and one structure serves all hypotheses
     if name in ("voltage_saturation", "voltage_dead_zone", "winding_heating"):
         return arm.drive == "voltage"
     if name == "torque_constant":
@@ -144,15 +145,17 @@ def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float
 class Motion:
     """The motion that a model predicts for a run, sample by sample and in between."""
 
-    def __init__(
-        self, parameters: Parameters, vector: np.ndarray, states: np.ndarray, ends: np.ndarray,
-        command: np.ndarray, dt: float,
-    ):  # fmt: skip
+    def __init__(self, problem: Problem, run: Run, vector: np.ndarray):
+        parameters = problem.setting.parameters
+        response = problem.predict(run, vector)
+        pieces, _ = problem.pieces(run, vector, 1)
+        states, ends = np.asarray(response.states), np.asarray(response.end)
         self.parameters = parameters
         self.arm = parameters.build(jnp.asarray(vector), 0.0)
         self.model = self.arm.assemble()
-        self.command = command
-        self.dt = dt
+        self.command = np.asarray(pieces.command)
+        self.time = np.asarray(pieces.time)
+        self.dt = problem.setting.sample_time
         following = np.concatenate([states[:, 1:], ends[:, None]], 1)
         weights = np.array([0.125, 0.375, 0.625, 0.875])
         # (points, pieces, samples, states): within each interval, along a straight line
@@ -200,7 +203,7 @@ class Motion:
             found[k] = keep * found[k - 1] + power[k - 1] * self.dt
         return found.reshape(self.command.shape[:2])
 
-    def forcing(self, candidate: Candidate, time: np.ndarray) -> np.ndarray | None:
+    def forcing(self, candidate: Candidate) -> np.ndarray | None:
         """Columns of commands and forces, one an amplitude, or None for slopes by a parameter."""
         kind = EFFECTS[candidate.effect]
         if candidate.location.rpartition("_")[0] != "joint":
@@ -222,7 +225,7 @@ class Motion:
                 options |= dict.fromkeys(candidate.amplitudes, 0.0) | {amplitude: 1.0}
                 effect = kind(location=candidate.location, **options)
                 angle, rate = self.angle(joint), self.rate(joint)
-                at = np.broadcast_to(time + self.dt / 2, angle.shape)
+                at = np.broadcast_to(self.time + self.dt / 2, angle.shape)
                 flat = jax.vmap(effect)(*(jnp.asarray(v.ravel()) for v in (angle, rate, at)))
                 torque = np.asarray(flat).reshape(angle.shape)
                 column = blank.copy()

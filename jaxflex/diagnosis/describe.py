@@ -16,7 +16,7 @@ from ..files.units import parameter_unit
 from ..sensors import unit
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
-from .hypothesis import HORIZONS, Hypothesis, Outcome, Search, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
 from .locate import LatentForce, regimes
 from .next_experiment import advice
 from .prepare import Prepared
@@ -24,7 +24,6 @@ from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem, Run
 
 AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
-CLOSE = 2.0  # misfit a reading up to which a fit is trusted with the parameters
 MOSTLY = 0.6  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]

@@ -9,7 +9,7 @@ import numpy as np
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .describe import describe
-from .hypothesis import HORIZONS, Hypothesis, Outcome, Ranked, Search, without
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Ranked, Search, without
 from .prepare import make_problem
 from .result import Diagnosis
 
@@ -17,7 +17,6 @@ MOST_EFFECTS = 5
 STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain worth an effect
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
-CLOSE = 2.0  # misfit a reading beyond which a fit does not climb to longer horizons
 LITTLE = 0.01  # of the gap there was: what may be left over a second where a tenth of one is followed
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
@@ -78,7 +77,6 @@ def find(search: Search) -> Outcome:
             # parameters as they were before it are judged as well, over the shortest horizon
             search.restart(base_starts)
             ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
-        outcome.left = ranked
         tried = _short_list(ranked)
         if not tried or len(fitted.effects) == MOST_EFFECTS:
             break

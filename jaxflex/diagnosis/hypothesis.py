@@ -12,13 +12,14 @@ from .calibrate import Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
-from .screen import Score, scores, with_candidates
+from .screen import scores, with_candidates
 from .shooting import Problem, Run
 
 HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # A model is never the plant. What it gets wrong shows more the longer it runs, and is no
 # missing effect: gains below this share of the readings, times the horizon, count as that.
 MODEL_ERROR = 0.002
+CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
@@ -60,11 +61,8 @@ class Ranked:
 
     candidate: Candidate
     step: tuple[float, ...]
-    nominal: np.ndarray
     gain: float
     strength: float
-    horizon: int
-    survival: float
 
 
 def allowance(count: int, horizon: int) -> float:
@@ -195,17 +193,15 @@ class Search:
         frequencies = strongest_frequencies(self.latent(vector)[0], FREQUENCIES)
         if instead is not None and instead.effect == "periodic_disturbance":
             frequencies = [dict(instead.shape)["frequency"], *frequencies]
-        response = self.problem.predict(self.runs[0], vector)
-        pieces, _ = self.problem.pieces(self.runs[0], vector, 1)
-        motion = Motion(
-            parameters, vector, response.states, response.end, np.asarray(pieces.command),
-            self.problem.setting.sample_time,
-        )  # fmt: skip
+        motions = [Motion(self.problem, run, vector) for run in self.runs]
         taken = {effect.key for effect in effects if effect is not instead}
-        tried = [c for c in candidates(parameters, motion, frequencies) if c.key not in taken]
+        tried = [c for c in candidates(parameters, motions[0], frequencies) if c.key not in taken]
         columns = list(free.columns)
         own = [] if instead is None else self._own_places(columns, instead)
-        linears = [with_candidates(self.problem, run, vector, columns, tried) for run in self.runs]
+        linears = [
+            with_candidates(self.problem, run, motion, vector, columns, tried)
+            for run, motion in zip(self.runs, motions, strict=True)
+        ]
         pull = -free.precision * (vector[columns] - free.centre)
         best: dict[tuple[str, str], Ranked] = {}
         for horizon in horizons:
@@ -228,7 +224,7 @@ class Search:
                 strength = score.gain / allowance(normal.count, horizon)
                 kept = best.get(score.candidate.key)
                 if kept is None or strength > kept.strength:
-                    best[score.candidate.key] = _ranked(score, strength, horizon)
+                    best[score.candidate.key] = Ranked(score.candidate, score.step, score.gain, strength)
         return sorted(best.values(), key=lambda ranked: -ranked.strength)
 
     def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
@@ -258,10 +254,6 @@ class Search:
         return self.climb((*base.effects, ranked.candidate), vector, to=to, iterations=4)
 
 
-def _ranked(score: Score, strength: float, horizon: int) -> Ranked:
-    return Ranked(score.candidate, score.step, np.zeros(0), score.gain, strength, horizon, score.survival)
-
-
 class Outcome:
     """What the search came to: the nominal fit, the final one, and rivals of each effect."""
 
@@ -272,4 +264,3 @@ class Outcome:
         self.final_starts = starts
         self.rivals: list[tuple[int, Hypothesis]] = []
         self.gains: list[float] = []
-        self.left: list[Ranked] = []

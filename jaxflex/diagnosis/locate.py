@@ -65,11 +65,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
         for b in range(blocks):
             forcing[e * blocks + b, :, edges[b] : edges[b + 1], column] = 1.0
     linear = problem.linearise(run, vector, [], forcing)
-    response = problem.predict(run, vector)
-    pieces, _ = problem.pieces(run, vector, 1)
-    motion = Motion(
-        s.parameters, vector, response.states, response.end, np.asarray(pieces.command), s.sample_time
-    )
+    motion = Motion(problem, run, vector)
     found = []
     for e, (name, unit, _) in enumerate(places):
         part = slice(e * blocks, (e + 1) * blocks)
@@ -78,7 +74,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
         middle = [(a + b) // 2 for a, b in itertools.pairwise(edges)]
         angle = motion.angle(joint).mean(0)[:, middle].ravel()
         rate = motion.rate(joint).mean(0)[:, middle].ravel()
-        times = np.asarray(pieces.time)[:, middle].ravel()
+        times = motion.time[:, middle].ravel()
         acceleration = np.gradient(rate, times)
         inside = times <= run.times[-1]
         found.append(

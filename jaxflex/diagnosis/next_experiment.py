@@ -9,7 +9,7 @@ import dataclasses
 
 import numpy as np
 
-from .catalogue import Candidate
+from .catalogue import Candidate, Motion
 from .hypothesis import HORIZONS, Hypothesis, Search, freedom
 from .screen import with_candidates
 from .shooting import Run
@@ -56,7 +56,12 @@ def separations(search: Search, final: Hypothesis, first: Candidate, second: Can
     for name, change in MENU.items():
         other = simulated(search, run, vector, change(run.command))
         linear, (own, rival) = with_candidates(
-            search.problem, other, vector, list(free.columns), [first, second]
+            search.problem,
+            other,
+            Motion(search.problem, other, vector),
+            vector,
+            list(free.columns),
+            [first, second],
         )
         matrix = search.problem.condense(other, linear, HORIZONS[-1]).matrix
         if not np.isfinite(matrix).all():

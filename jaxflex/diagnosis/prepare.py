@@ -118,23 +118,21 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording]) -> Prepared:
         parameters, outputs, np.array(noise), colour, step, length,
         substeps, np.full(state_size(model, outputs), 1e3),
     )  # fmt: skip
-    runs = [make_run(f"run {i}", piece, inputs, setting) for i, piece in enumerate(pieces, 1)]
+    runs = [make_run(piece, inputs, setting) for piece in pieces]
     if len(runs) > 1:
         count = (len(runs) + 1) // 2
         calibration, held_out = runs[:count], runs[count:]
     else:
         cut = int(CALIBRATION * len(pieces[0]) / length) * length
-        calibration = [make_run("first part", pieces[0].window(0, cut), inputs, setting)]
-        held_out = [make_run("last part", pieces[0].window(cut, len(pieces[0])), inputs, setting, cut * step)]
+        calibration = [make_run(pieces[0].window(0, cut), inputs, setting)]
+        held_out = [make_run(pieces[0].window(cut, len(pieces[0])), inputs, setting, cut * step)]
     return Prepared(
-        Problem(setting, runs), calibration, held_out,
+        Problem(setting), calibration, held_out,
         {name: floors[name].std for name in outputs}, tuple(dict.fromkeys(notes)),
     )  # fmt: skip
 
 
-def make_run(
-    name: str, recording: Recording, inputs: Sequence[str], setting: Setting, begin: float = 0.0
-) -> Run:
+def make_run(recording: Recording, inputs: Sequence[str], setting: Setting, begin: float = 0.0) -> Run:
     """A recording cut into pieces, its starts guessed; `begin` [s] since the start of the run."""
     dt, length = setting.sample_time, setting.length
     times = begin + np.arange(len(recording)) * dt
@@ -145,7 +143,7 @@ def make_run(
     padded = np.pad(reading, ((0, total - len(times)), (0, 0)), mode="edge").reshape(pieces, length, -1)
     valid = (np.arange(total) < len(times)).reshape(pieces, length)
     starts = first_starts(setting.parameters, setting.channels, times, reading, command, length, dt)
-    return Run(name, times, command, padded, valid, starts)
+    return Run(times, command, padded, valid, starts)
 
 
 def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:

@@ -1,6 +1,6 @@
 """What a diagnosis says: verdict, effects, where, how sure, and the gap before and after."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -86,7 +86,6 @@ class Diagnosis:
     forces_before: tuple[LatentForce, ...] = ()
     forces_after: tuple[LatentForce, ...] = ()
     comparison: Comparison | None = None
-    history: tuple[tuple[str, float], ...] = field(default=())
 
     def __repr__(self) -> str:
         named = ", ".join(f"{e.name} at {e.location}" for e in self.effects) or "no effect"

@@ -16,35 +16,32 @@ class Score:
     """What adding a candidate would gain, to first order.
 
     `gain`: fall of the cost (misfit and prior, in units of the noise); `step`: its
-    amplitudes; `spread`: their standard deviations; `survival`: the share of the
-    candidate's response that no nominal parameter can imitate.
+    amplitudes; `survival`: the share of the candidate's response that no nominal
+    parameter can imitate.
     """
 
     candidate: Candidate
     gain: float
     step: tuple[float, ...]
-    spread: tuple[float, ...]
     survival: float
 
 
 def with_candidates(
-    problem: Problem, run: Run, vector: np.ndarray, columns: list[int], candidates: list[Candidate]
+    problem: Problem,
+    run: Run,
+    motion: Motion,
+    vector: np.ndarray,
+    columns: list[int],
+    candidates: list[Candidate],
 ) -> tuple[Linearised, list[slice]]:
-    """A run made linear in the parameters at `columns`, then in every candidate's amplitudes."""
+    """A run made linear in the parameters at `columns`, then in every candidate's amplitudes.
+
+    `motion`: what the model predicts for the run at `vector`.
+    """
     parameters = problem.setting.parameters
-    response = problem.predict(run, vector)
-    pieces, _ = problem.pieces(run, vector, 1)
-    motion = Motion(
-        parameters,
-        vector,
-        response.states,
-        response.end,
-        np.asarray(pieces.command),
-        problem.setting.sample_time,
-    )
     forcings, inside, order = [], [], []
     for candidate in candidates:
-        forcing = motion.forcing(candidate, np.asarray(pieces.time))
+        forcing = motion.forcing(candidate)
         if forcing is None:
             at = [parameters.position(*candidate.key, name) for name in candidate.amplitudes]
             order.append((True, len(inside), len(at)))
@@ -90,10 +87,5 @@ def scores(
         inverse = np.linalg.pinv(tidy, hermitian=True) / np.outer(scale, scale)
         step = inverse @ right
         survival = float(np.sqrt(np.clip(np.diag(tidy), 0, None).max()))
-        found.append(
-            Score(
-                candidate, float(right @ step), tuple(step),
-                tuple(np.sqrt(np.clip(np.diag(inverse), 0, None))), survival,
-            )
-        )  # fmt: skip
+        found.append(Score(candidate, float(right @ step), tuple(step), survival))
     return found

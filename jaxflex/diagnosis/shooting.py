@@ -35,7 +35,6 @@ LANES = 12  # directions differentiated side by side: one compiled program whate
 class Run:
     """A recording cut into pieces, with the states its pieces start from."""
 
-    name: str
     times: np.ndarray  # (samples,)
     command: np.ndarray  # (samples, joints), as logged
     reading: np.ndarray  # (pieces, samples, channels)
@@ -76,12 +75,14 @@ class Linearised:
 
 @dataclass
 class Normal:
-    """Least squares in the columns alone, the starts eliminated: `N d = g`, cost at d = 0."""
+    """Least squares in the columns alone, the starts eliminated: `N d = g`.
+
+    `cost` is that of the starts and columns as they are.
+    """
 
     matrix: np.ndarray
     vector: np.ndarray
-    cost: float  # of the best starts
-    held: float  # of the starts as they are
+    cost: float
     count: int
     back: list = field(default_factory=list)  # what gives the starts once d is known
 
@@ -90,7 +91,6 @@ class Normal:
             self.matrix + other.matrix,
             self.vector + other.vector,
             self.cost + other.cost,
-            self.held + other.held,
             self.count + other.count,
             [*self.back, *other.back],
         )
@@ -142,11 +142,10 @@ def _assembled_along(arm: Arm, directions: Any) -> Any:
 
 
 class Problem:
-    """Runs and parameters, linearised and solved."""
+    """What turns runs and parameters into least squares."""
 
-    def __init__(self, setting: Setting, runs: list[Run]):
+    def __init__(self, setting: Setting):
         self.setting = setting
-        self.runs = runs
         self._delay = [
             next(
                 (
@@ -235,7 +234,6 @@ class Problem:
         model = self.arm(vector, substeps).assemble()
         instruments = self.instruments(vector)
         pieces, delay_slope = self.pieces(run, vector, substeps)
-        response = self.predict(run, vector)
         states, joints, size = run.starts.shape[1], run.command.shape[1], model.size
         more = 0 if forcing is None else len(forcing)
         total = states + len(columns) + more
@@ -269,13 +267,19 @@ class Problem:
             readings, ends = zip(*pool.map(some, range(0, lanes, LANES)), strict=True)
         reading = np.moveaxis(np.concatenate(readings)[:total], 0, -1) / s.noise[:, None]
         end = np.moveaxis(np.concatenate(ends)[:total], 0, -1)
-        gap = np.zeros_like(run.starts)
-        gap[:-1] = response.end[:-1] - run.starts[1:]
-        residual = np.where(run.valid[..., None], (run.reading - response.reading) / s.noise, 0.0)
+        residual, gap = self._misfit(run, vector)
         reading = np.where(run.valid[..., None, None], reading, 0.0)
         return Linearised(
             residual, reading[..., :states], reading[..., states:], end[..., :states], end[..., states:], gap
         )
+
+    def _misfit(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual of every reading in units of the noise, and the gap after every piece."""
+        response = self.predict(run, vector)
+        residual = (run.reading - response.reading) / self.setting.noise
+        gap = np.zeros_like(run.starts)
+        gap[:-1] = response.end[:-1] - run.starts[1:]
+        return np.where(run.valid[..., None], residual, 0.0), gap
 
     def _instruments_along(self, unit: np.ndarray) -> Instruments:
         zero = self.instruments(np.zeros(unit.shape[1]))
@@ -290,7 +294,7 @@ class Problem:
         s = self.setting
         columns = linear.by_column.shape[-1]
         states = run.starts.shape[1]
-        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0, 0)
+        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0)
         cuts = np.unique(
             np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
         )
@@ -311,7 +315,7 @@ class Problem:
                 offset = through @ offset + linear.gap[j]
             table = np.concatenate(rows)
             if not np.isfinite(table).all() or np.abs(table).max() > LOST:
-                total.held = total.cost = np.inf
+                total.cost = np.inf
                 return total
             for c, filter_ in enumerate(s.colour):
                 if len(filter_) > 1:
@@ -325,7 +329,6 @@ class Problem:
             total = total + Normal(
                 gram[b, b] - gram[b, a] @ solved[:, :-1],
                 gram[b, -1] - gram[b, a] @ solved[:, -1],
-                gram[-1, -1] - gram[-1, a] @ solved[:, -1],
                 gram[-1, -1],
                 int(run.valid[first:last].sum()) * len(s.channels),
                 [(run, kept, solved)],
@@ -341,9 +344,5 @@ class Problem:
 
     def refresh(self, run: Run, vector: np.ndarray, linear: Linearised) -> Linearised:
         """The same slopes about where the run is now."""
-        response = self.predict(run, vector)
-        gap = np.zeros_like(run.starts)
-        gap[:-1] = response.end[:-1] - run.starts[1:]
-        residual = (run.reading - response.reading) / self.setting.noise
-        residual = np.where(run.valid[..., None], residual, 0.0)
+        residual, gap = self._misfit(run, vector)
         return dataclasses.replace(linear, residual=residual, gap=gap)
