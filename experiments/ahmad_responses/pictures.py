@@ -4,21 +4,14 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.pictures import figure as new_figure
+
 from .paper import COLUMNS, PAYLOADS, TABLE_II
-
-
-def _figure(rows: int, columns: int, size):
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
-    for axis in axes.flat:
-        axis.grid(True, alpha=0.3, linewidth=0.5)
-        axis.spines[["top", "right"]].set_visible(False)
-    return figure, axes
 
 
 def plot_responses(payloads, cases: dict[str, np.ndarray]) -> Figure:
     """Both joint angles over time for every payload; `cases`: `(payloads, joints, times)` [rad]."""
-    figure, axes = _figure(2, len(cases), (11.0, 5.6))
+    figure, axes = new_figure(2, len(cases), 2.8, 11.0)
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, len(payloads)))
     for column, (title, curves) in enumerate(cases.items()):
         times = np.linspace(0.0, 5.0, curves.shape[-1])
@@ -36,7 +29,7 @@ def plot_responses(payloads, cases: dict[str, np.ndarray]) -> Figure:
 
 def plot_table(payloads, tables: dict[str, np.ndarray]) -> Figure:
     """Table II: the paper's figures and ours against payload."""
-    figure, axes = _figure(2, 3, (11.0, 5.6))
+    figure, axes = new_figure(2, 3, 2.8, 11.0)
     for joint in range(2):
         for column in range(3):
             axis = axes[joint, column]

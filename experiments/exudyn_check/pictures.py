@@ -3,24 +3,17 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.pictures import figure as new_figure
+
 from .compare import Pair
 from .large import EXUDYN, PLAIN, STIFF, Spin
 
 COLOURS = {EXUDYN: "0.55", PLAIN: "#c44e52", STIFF: "#2a6f97"}
 
 
-def _figure(rows: int, columns: int, size):
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
-    for axis in axes.flat:
-        axis.grid(True, alpha=0.3, linewidth=0.5)
-        axis.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
 def plot_small(pairs: dict[str, Pair]) -> Figure:
     """The tip's deflection of the last link and its path in both programs."""
-    figure, axes = _figure(len(pairs), 2, (9.0, 2.6 * len(pairs)))
+    figure, axes = new_figure(len(pairs), 2, 2.6, 9.0)
     for row, (name, pair) in zip(axes, pairs.items(), strict=True):
         theirs, ours = pair.exudyn, pair.jaxflex
         for i in range(theirs.deflection.shape[1]):
@@ -47,7 +40,7 @@ def plot_validity(
     shaken: list[dict[str, Pair]], pushed: list[dict[str, Pair]], spins: list[Spin], bound: float
 ) -> Figure:
     """Error of the tip against deflection, and frequency against hub speed."""
-    figure, (axes,) = _figure(1, 2, (10.0, 4.0))
+    figure, (axes,) = new_figure(1, 2, 4, 10.0)
     for name in (PLAIN, STIFF):
         for cases, mark, what in ((shaken, "o-", "one link, shaken"), (pushed, "s--", "two links, pushed")):
             share = [100 * case[name].deflection_share() for case in cases]
@@ -84,7 +77,7 @@ def plot_validity(
 def plot_spin(spins: list[Spin], shown) -> Figure:
     """Deflection of a link while it is spun up and after it is tapped."""
     chosen = [min(spins, key=lambda s, r=r: abs(s.ratio - r)) for r in shown]
-    figure, axes = _figure(1, len(chosen), (10.0, 3.4))
+    figure, axes = new_figure(1, len(chosen), 3.4, 10.0)
     for axis, spin in zip(axes[0], chosen, strict=True):
         top = 130 * np.max(np.abs(spin.traces[EXUDYN]))
         for name, width in ((EXUDYN, 3.0), (PLAIN, 1.0), (STIFF, 1.2)):

@@ -55,23 +55,27 @@ class AbstractJointEffect(AbstractEffect):
 
 
 class AbstractDriveEffect(AbstractEffect):
-    """Something between a command and its torque: in the amplifier, the winding or the magnets."""
+    """Something between a command and its torque: in the amplifier, the winding or the magnets.
 
-    @abstractmethod
+    An effect overrides what it changes; left alone, a command arrives as it is, the motor
+    stays what it was, and nothing is remembered.
+    """
+
     def initial(self) -> PyTree:
         """Memory at the start, a pytree of scalars; None for an effect without."""
+        return None
 
-    @abstractmethod
     def command(self, command: Scalar, memory: PyTree) -> Scalar:
         """What reaches the motor of a command [V], [A] or [N m]."""
+        return command
 
-    @abstractmethod
     def motor(self, motor: Any, memory: PyTree) -> Any:
         """The `DCMotor` as it is now."""
+        return motor
 
-    @abstractmethod
     def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
         """Time derivative of the memory."""
+        return None
 
 
 class AbstractBodyEffect(AbstractEffect):

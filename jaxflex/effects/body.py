@@ -1,5 +1,6 @@
 """Changes of the arm itself: masses, springs and dampers that are not what was said."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -7,6 +8,13 @@ import jax.numpy as jnp
 
 from ..scalars import Scalar, scalar
 from .base import AbstractBodyEffect
+
+
+def raised(arm: Any, place: Callable[[Any], Any], by: Scalar) -> Any:
+    """The arm with the parameter at `place` higher by so much, from zero where it was absent."""
+    own = place(arm)
+    value = by if own is None else own + by
+    return eqx.tree_at(place, arm, value, is_leaf=lambda x: x is None)
 
 
 class PayloadMass(AbstractBodyEffect):
@@ -21,7 +29,7 @@ class PayloadMass(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the payload that it carries."""
-        return eqx.tree_at(lambda a: a.payload.mass, arm, arm.payload.mass + self.mass)
+        return raised(arm, lambda a: a.payload.mass, self.mass)
 
 
 class HubInertia(AbstractBodyEffect):
@@ -36,8 +44,7 @@ class HubInertia(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the hub that it has."""
-        part = arm.joints[self.index].hub_inertia
-        return eqx.tree_at(lambda a: a.joints[self.index].hub_inertia, arm, part + self.inertia)
+        return raised(arm, lambda a: a.joints[self.index].hub_inertia, self.inertia)
 
 
 class ViscousFriction(AbstractBodyEffect):
@@ -52,8 +59,7 @@ class ViscousFriction(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the friction that it has."""
-        part = arm.joints[self.index].viscous_friction
-        return eqx.tree_at(lambda a: a.joints[self.index].viscous_friction, arm, part + self.coefficient)
+        return raised(arm, lambda a: a.joints[self.index].viscous_friction, self.coefficient)
 
 
 class JointFlexibility(AbstractBodyEffect):
@@ -72,8 +78,7 @@ class JointFlexibility(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the spring at its joint."""
-        part = arm.joints[self.index].compliance
-        return eqx.tree_at(lambda a: a.joints[self.index].compliance, arm, part + self.compliance)
+        return raised(arm, lambda a: a.joints[self.index].compliance, self.compliance)
 
 
 class RootCompliance(AbstractBodyEffect):
@@ -91,8 +96,7 @@ class RootCompliance(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the clamp that it has."""
-        part = arm.links[self.index].root_compliance
-        return eqx.tree_at(lambda a: a.links[self.index].root_compliance, arm, part + self.compliance)
+        return raised(arm, lambda a: a.links[self.index].root_compliance, self.compliance)
 
 
 class StructuralDamping(AbstractBodyEffect):
@@ -128,12 +132,7 @@ class CentrifugalStiffening(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with its links shortened as they bend."""
-        part = arm.links[self.index].shortening
-        return eqx.tree_at(
-            lambda a: a.links[self.index].shortening, arm,
-            self.share if part is None else part + self.share,
-            is_leaf=lambda x: x is None,
-        )  # fmt: skip
+        return raised(arm, lambda a: a.links[self.index].shortening, self.share)
 
 
 class Gravity(AbstractBodyEffect):
@@ -153,14 +152,8 @@ class Gravity(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the gravity that acts on it."""
-        own = 0.0 if arm.gravity is None else arm.gravity
-        side = 0.0 if arm.side_gravity is None else arm.side_gravity
-        zero = jnp.zeros_like(self.along_y)
-        return eqx.tree_at(
-            lambda a: (a.gravity, a.side_gravity), arm,
-            (own + self.along_y, side + self.along_x + zero),
-            is_leaf=lambda x: x is None,
-        )  # fmt: skip
+        arm = raised(arm, lambda a: a.gravity, self.along_y)
+        return raised(arm, lambda a: a.side_gravity, self.along_x)
 
 
 class Backlash(AbstractBodyEffect):

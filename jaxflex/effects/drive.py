@@ -20,22 +20,10 @@ class VoltageSaturation(AbstractDriveEffect):
     units: ClassVar[dict[str, str]] = {"limit": "V"}
     looks_like: ClassVar[str] = "a voltage that is missing only while the command is large"
 
-    def initial(self) -> PyTree:
-        """None."""
-        return None
-
     def command(self, command: Scalar, memory: PyTree) -> Scalar:
         """`max(-V_max, min(V_max, V))` [V]."""
         bound = jnp.where(self.limit > 0, self.limit, jnp.inf)
         return jnp.clip(command, -bound, bound)
-
-    def motor(self, motor: Any, memory: PyTree) -> Any:
-        """The motor as it is."""
-        return motor
-
-    def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
-        """None."""
-        return None
 
 
 class VoltageDeadZone(AbstractDriveEffect):
@@ -48,21 +36,9 @@ class VoltageDeadZone(AbstractDriveEffect):
     units: ClassVar[dict[str, str]] = {"width": "V"}
     looks_like: ClassVar[str] = "a voltage that is missing by the same amount for any command, with its sign"
 
-    def initial(self) -> PyTree:
-        """None."""
-        return None
-
     def command(self, command: Scalar, memory: PyTree) -> Scalar:
         """`sign(V) max(|V| - w, 0)` [V]."""
         return jnp.sign(command) * jnp.maximum(jnp.abs(command) - self.width, 0.0)
-
-    def motor(self, motor: Any, memory: PyTree) -> Any:
-        """The motor as it is."""
-        return motor
-
-    def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
-        """None."""
-        return None
 
 
 class InputDelay(AbstractDriveEffect):
@@ -87,10 +63,6 @@ class InputDelay(AbstractDriveEffect):
         """The command as it was `delay` seconds ago."""
         level, slope = memory
         return jnp.where(self.delay > 0, level - slope / 3, command)
-
-    def motor(self, motor: Any, memory: PyTree) -> Any:
-        """The motor as it is."""
-        return motor
 
     def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
         """`z' = w / tau`, `w' = 6 (u - z - 2 w / 3) / tau`."""
@@ -119,10 +91,6 @@ class WindingHeating(AbstractDriveEffect):
         """A cold winding."""
         return jnp.zeros_like(self.coefficient)
 
-    def command(self, command: Scalar, memory: PyTree) -> Scalar:
-        """The command as it is."""
-        return command
-
     def motor(self, motor: Any, memory: PyTree) -> Any:
         """The motor with `R (1 + c H)`."""
         return eqx.tree_at(lambda m: m.resistance, motor, motor.resistance * (1 + self.coefficient * memory))
@@ -149,14 +117,6 @@ class TorqueConstant(AbstractDriveEffect):
     units: ClassVar[dict[str, str]] = {"change": "N m/A", "back_emf_share": "1"}
     looks_like: ClassVar[str] = "a torque in proportion to the current"
 
-    def initial(self) -> PyTree:
-        """None."""
-        return None
-
-    def command(self, command: Scalar, memory: PyTree) -> Scalar:
-        """The command as it is."""
-        return command
-
     def motor(self, motor: Any, memory: PyTree) -> Any:
         """The motor with `K_m + change`."""
         constants = (
@@ -164,7 +124,3 @@ class TorqueConstant(AbstractDriveEffect):
             motor.back_emf_constant + self.back_emf_share * self.change,
         )
         return eqx.tree_at(lambda m: (m.torque_constant, m.back_emf_constant), motor, constants)
-
-    def rate(self, command: Scalar, current: Scalar, motor: Any, memory: PyTree) -> PyTree:
-        """None."""
-        return None
