@@ -101,11 +101,18 @@ def drive_memory_rates(
     )
 
 
-def effect_torques(model: AssembledArm, angles: tuple, rates: tuple, time: Scalar) -> tuple[Scalar, ...]:
-    """Sum of the effects that act as torques on every joint [N m]."""
+def joint_effects(model: AssembledArm) -> tuple[AbstractJointEffect, ...]:
+    """The effects that act as torques at the joints, in the order of the arm."""
+    return tuple(e for e in model.arm.effects if isinstance(e, AbstractJointEffect))
+
+
+def effect_torques(
+    effects: tuple[AbstractJointEffect, ...], angles: tuple, rates: tuple, time: Scalar
+) -> tuple[Scalar, ...]:
+    """Sum of `effects` on every joint [N m]."""
     torques = [jnp.zeros_like(rate) for rate in rates]
-    for effect in model.arm.effects:
-        if isinstance(effect, AbstractJointEffect):
-            i = effect.index
-            torques[i] = torques[i] + effect(angles[i], rates[i], time)
+    for effect in effects:
+        torques[effect.index] = torques[effect.index] + effect(
+            angles[effect.index], rates[effect.index], time
+        )
     return tuple(torques)

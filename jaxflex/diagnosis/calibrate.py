@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .shooting import Linearised, Normal, Problem, Run, solve
+from .normal import Normal, solve
+from .shooting import Linearised, Problem, Run
 
 CHORDS = 5  # steps with the same slopes; each needs only a run of the model
 MOST = 15  # iterations, however well they do
+FAITHFUL = 0.1  # of a fall of the cost: slopes that foretell it better than that need no renewal
 SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
@@ -54,11 +56,14 @@ def fit(
     horizon: int,
     iterations: int = 4,
     tolerance: float = 3e-4,
+    fresh: bool = False,
 ) -> Fit:
     """Minimise misfit over `horizon` pieces plus prior; the starts of the pieces move along.
 
-    Ends when an iteration gains less than `tolerance` a reading, or, after `iterations`
-    of them, less than the share SLOW of the cost.
+    Slopes of an earlier fit serve as long as they foretell how far the cost falls; with
+    `fresh`, they are taken anew at the end. Ends when slopes that hold have nothing more to
+    gain, when an iteration gains less than `tolerance` a reading, or, after `iterations` of
+    them, less than the share SLOW of the cost.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -80,16 +85,15 @@ def fit(
 
     damping = 0.0
     kept = None
+    renew = False
     for iteration in range(MOST):
-        linears = [problem.linearise(run, vector, columns) for run in runs]
+        linears = [problem.linearise(run, vector, columns, fresh=renew) for run in runs]
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)
-        before = kept[0]
-        if not np.isfinite(before):
-            break
-        while damping < STEEPEST:
+        before, promise, settled = kept[0], np.inf, False
+        while np.isfinite(before) and damping < STEEPEST:
             current, cost = first, before
-            for _ in range(CHORDS):
+            for chord in range(CHORDS):
                 matrix = current.matrix + np.diag(freedom.precision)
                 matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
                 pull = current.vector - freedom.precision * (vector[columns] - freedom.centre)
@@ -97,6 +101,8 @@ def fit(
                 if not np.isfinite(step).all():
                     cost = np.inf
                     break
+                if chord == 0:
+                    promise = current.promise + float(pull @ step)
                 step = np.maximum(vector[columns] + step, freedom.lowest) - vector[columns]
                 problem.move_starts(current, step)
                 vector[columns] += step
@@ -118,11 +124,26 @@ def fit(
                 damping = damping / 10 if damping > 1e-4 else 0.0
                 break
             restore(kept)
+            if settled:
+                break
             damping = max(10 * damping, 1e-4)
             first = condensed(linears)
         restore(kept)
+        if iteration < iterations and any([problem.mend(run, vector) for run in runs]):
+            renew = True
+            continue
         gain = before - kept[0]
-        if gain < tolerance * first.count or (iteration + 1 >= iterations and gain < SLOW * before):
+        small = tolerance * first.count
+        held = settled and abs(promise - gain) < max(FAITHFUL * gain, small)
+        if held or (renew and not np.isfinite(before)):
             break
+        if renew and (gain < small or (iteration + 1 >= iterations and gain < SLOW * before)):
+            break
+        renew = True
     assert kept is not None
-    return Fit(vector, freedom, kept[0], prior(vector), kept[1])
+    normal = kept[1]
+    if fresh:
+        linears = [problem.linearise(run, vector, columns) for run in runs]
+        damping = 0.0
+        normal = condensed(linears)
+    return Fit(vector, freedom, kept[0], prior(vector), normal)

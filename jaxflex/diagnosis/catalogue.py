@@ -148,10 +148,10 @@ class Motion:
     def __init__(self, problem: Problem, run: Run, vector: np.ndarray):
         parameters = problem.setting.parameters
         response = problem.predict(run, vector)
-        pieces, _ = problem.pieces(run, vector, 1)
+        pieces, _ = problem.pieces(run, vector)
         states, ends = np.asarray(response.states), np.asarray(response.end)
         self.parameters = parameters
-        self.arm = parameters.build(jnp.asarray(vector), 0.0)
+        self.arm = parameters.build(jnp.asarray(vector))
         self.model = self.arm.assemble()
         self.command = np.asarray(pieces.command)
         self.time = np.asarray(pieces.time)

@@ -24,7 +24,7 @@ from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem, Run
 
 AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
-MOSTLY = 0.6  # share of the gap that named effects must explain where the floor is not reached
+MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]
 
@@ -55,7 +55,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
         alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
     verdict = _verdict(outcome, levels, gone)
     vector = final.fit.vector
-    arm = parameters.build(jnp.asarray(vector), 0.0)
+    arm = parameters.build(jnp.asarray(vector))
     improved = _with_outside(file, search, arm, outcome.final.effects, vector)
     comparison = _comparison(prepared, before[1], after[1])
     return Diagnosis(
@@ -116,7 +116,7 @@ def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothes
     runs = [*prepared.calibration, *prepared.held_out]
     search.restart(outcome.final_starts)
     free = freedom(search.parameters, final.effects)
-    found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3)
+    found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
     return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
 
 

@@ -13,7 +13,7 @@ from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
 from .screen import scores, with_candidates
-from .shooting import Problem, Run
+from .shooting import Problem, Run, Slopes
 
 HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # A model is never the plant. What it gets wrong shows more the longer it runs, and is no
@@ -27,6 +27,9 @@ INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and pa
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
 BARRED = 1e20  # precision that keeps a parameter where it is
 FREQUENCIES = 3  # of a periodic disturbance that are tried
+
+
+Starts = list[tuple[np.ndarray, Slopes | None]]
 
 
 @dataclass
@@ -130,14 +133,14 @@ class Search:
         self.parameters = problem.setting.parameters
         self.say = say
 
-    def starts(self) -> list[np.ndarray]:
-        """The starts of all pieces, to come back to."""
-        return [run.starts.copy() for run in self.runs]
+    def starts(self) -> Starts:
+        """The starts of all pieces, with the slopes there, to come back to."""
+        return [(run.starts.copy(), run.slopes) for run in self.runs]
 
-    def restart(self, starts: list[np.ndarray]) -> None:
+    def restart(self, starts: Starts) -> None:
         """Back to these starts."""
-        for run, kept in zip(self.runs, starts, strict=True):
-            run.starts = kept.copy()
+        for run, (kept, slopes) in zip(self.runs, starts, strict=True):
+            run.starts, run.slopes = kept.copy(), slopes
 
     def settle(self, vector: np.ndarray, horizon: int = 1) -> Fit:
         """The starts alone, parameters held."""
@@ -247,7 +250,7 @@ class Search:
             and len(item.candidate.amplitudes) <= len(effect.amplitudes)
         ]
 
-    def confirm(self, base: Hypothesis, starts: list[np.ndarray], ranked: Ranked, to: int) -> Hypothesis:
+    def confirm(self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int) -> Hypothesis:
         """The candidate added to `base` in full, fitted from `starts`."""
         self.restart(starts)
         vector = adopt(self.parameters, base.fit.vector, ranked.candidate, ranked.step)
@@ -257,7 +260,7 @@ class Search:
 class Outcome:
     """What the search came to: the nominal fit, the final one, and rivals of each effect."""
 
-    def __init__(self, nominal: Hypothesis, starts: list[np.ndarray]):
+    def __init__(self, nominal: Hypothesis, starts: Starts):
         self.nominal = nominal
         self.nominal_starts = starts
         self.final = nominal

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Motion
-from .shooting import LOST, Linearised, Problem, Run, solve
+from .normal import solve
+from .shooting import LOST, Linearised, Problem, Run
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece

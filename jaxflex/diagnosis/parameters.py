@@ -16,15 +16,12 @@ from jaxtyping import Array, Float
 
 from ..arm.arm import Arm
 from ..dynamics.lagrange import mass_matrix
-from ..effects import AbstractEffect, AbstractSensorEffect, InputDelay
+from ..effects import EFFECTS, AbstractDryFriction, AbstractEffect, AbstractSensorEffect, InputDelay
 from ..files.arm_file import ArmFile
 
 # what these do is done to the command and to the readings, not inside the arm
 OUTSIDE = (InputDelay, AbstractSensorEffect)
 
-STABLE = 0.45  # of a step times the slope of friction over inertia
-SHARP = 0.15  # of a transition rate: widening that is small enough
-MOST_SUBSTEPS = 16
 DEFAULT_UNCERTAINTY = 0.05  # relative, where an arm file says nothing
 
 
@@ -80,7 +77,8 @@ class Parameters:
         )  # fmt: skip
         model = self.arm.assemble()
         inverse = jnp.linalg.inv(mass_matrix(model, jnp.zeros(model.size)))
-        self._lightness = [float(inverse[i, i]) for i in range(len(file.arm.joints))]
+        self.lightness = np.array([float(inverse[i, i]) for i in range(len(file.arm.joints))])
+        self._always_dry = any(isinstance(effect, AbstractDryFriction) for effect in file.arm.effects)
         self.start = np.array([0.0] * len(self.nominal) + [part.value for part in self.effect])
 
     @property
@@ -95,32 +93,16 @@ class Parameters:
                 return len(self.nominal) + i
         raise KeyError(f"no parameter {field!r} of {effect!r} at {location!r}.")
 
-    def _friction(self, vector, part: EffectParameter):
-        """Sum of the torques of the friction that a transition rate belongs to."""
-        return sum(
-            vector[len(self.nominal) + k]
-            for k, other in enumerate(self.effect)
-            if (other.effect, other.location) == (part.effect, part.location)
-            and other.field in ("torque", "level")
+    def has_dry_friction(self, vector: np.ndarray) -> bool:
+        """True if some joint has friction that changes sign with the rate."""
+        return self._always_dry or any(
+            value != 0
+            for part, value in zip(self.effect, vector[len(self.nominal) :], strict=True)
+            if issubclass(EFFECTS[part.effect], AbstractDryFriction) and part.field in ("torque", "level")
         )
 
-    def substeps(self, vector: np.ndarray, sample_time: float, least: int) -> int:
-        """Integration steps in a sample interval, more of them where friction is sharp."""
-        needed = least
-        for part in self.effect:
-            if part.field == "transition_rate":
-                width = STABLE * sample_time * self._lightness[_number(part.location)]
-                torque = abs(float(self._friction(vector, part)))
-                sharp = SHARP * part.value
-                needed = max(needed, int(np.ceil(width * torque / sharp)))
-        return min(needed, MOST_SUBSTEPS)
-
-    def build(self, vector: Float[Array, " parameters"], step: float) -> Arm:
-        """The arm with the parameters of `vector`; differentiable.
-
-        Integration steps of `step` [s] cannot follow friction that changes sign faster than
-        they do: its transition is widened to what keeps them stable.
-        """
+    def build(self, vector: Float[Array, " parameters"]) -> Arm:
+        """The arm with the parameters of `vector`; differentiable."""
         moved: dict[int, tuple[Callable[[Any], Any], Any]] = {}
         for i, part in enumerate(self.nominal):
             for path, power in part.leaves:
@@ -129,12 +111,8 @@ class Parameters:
                 moved[key] = (path, value * jnp.exp(power * part.spread * vector[i]))
         first = len(self.nominal)
         for j, part in enumerate(self.effect):
-            value = vector[first + j]
-            if part.field == "transition_rate":
-                width = STABLE * step * self._lightness[_number(part.location)]
-                value = jnp.sqrt(value**2 + (width * self._friction(vector, part)) ** 2)
             if part.index is not None:
-                moved[-1 - j] = (_field(part.index, part.field), value)
+                moved[-1 - j] = (_field(part.index, part.field), vector[first + j])
         paths = [path for path, _ in moved.values()]
         return eqx.tree_at(
             lambda a: [path(a) for path in paths], self.arm, [value for _, value in moved.values()]
@@ -146,10 +124,6 @@ class Parameters:
             part.name: part.value * float(np.exp(part.spread * vector[i]))
             for i, part in enumerate(self.nominal)
         }
-
-
-def _number(location: str) -> int:
-    return int(location.rpartition("_")[2]) - 1
 
 
 def _field(index: int, field: str) -> Callable[[Any], Any]:

@@ -14,15 +14,16 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from ..arm.arm import AssembledArm
-from ..drive import drive, drive_effects, effect_torques, has_current_state
+from ..drive import drive, drive_effects, effect_torques, has_current_state, joint_effects
 from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
-from ..effects import WindingHeating
+from ..effects import AbstractDryFriction, WindingHeating
 from ..scalars import Scalar
 from ..sensors import read_channels
+from .dry_friction import Stepping, dry_friction
 
 
 class Instruments(NamedTuple):
@@ -39,13 +40,13 @@ class Pieces(eqx.Module):
 
     - `command`: held over each sample interval, `(pieces, samples, joints)`
     - `time` [s] since the start of the run, `(pieces, samples)`
-    - `sample_time` [s], the same for all; `substeps` of the integration in one
+    - `sample_time` [s], the same for all
     """
 
     command: Float[Array, "pieces samples joints"]
     time: Float[Array, "pieces samples"]
     sample_time: float = eqx.field(static=True)
-    substeps: Int[Array, ""]
+    stepping: Stepping
 
 
 class Response(NamedTuple):
@@ -78,14 +79,14 @@ def _drives(model: AssembledArm, command: tuple, qd: tuple, currents: tuple, hea
 
 
 def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
-    """Drives and accelerations at an instant."""
+    """Drives and accelerations at an instant, dry friction left to `force`."""
     q, qd, currents, heat, _ = _split(model, x)
     drives = _drives(model, command, qd, currents, heat)
     angles, _ = model.split(q)
     rates, _ = model.split(qd)
-    torques = tuple(
-        a + b for a, b in zip(drives.torque, effect_torques(model, angles, rates, t), strict=True)
-    )
+    smooth = tuple(e for e in joint_effects(model) if not isinstance(e, AbstractDryFriction))
+    extra = effect_torques(smooth, angles, rates, t)
+    torques = tuple(a + b for a, b in zip(drives.torque, extra, strict=True))
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
     total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(), qd, strict=True))
@@ -105,11 +106,14 @@ def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: 
     return (*qd, *qdd, *drives.current_rate, *warming, *(jnp.zeros_like(y) for y in shown))
 
 
-def truth(model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple) -> tuple:
-    """What perfect instruments would show."""
+def truth(
+    model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple, friction: tuple
+) -> tuple:
+    """What perfect instruments would show, under the dry friction of every joint."""
     q, qd, currents, heat, _ = _split(model, x)
     if any(name.startswith("tip_acceleration") for name in channels):
-        drives, qdd = _motion(model, t, x, command, (jnp.zeros_like(t),) * model.size)
+        elastic = (jnp.zeros_like(t),) * (model.size - len(friction))
+        drives, qdd = _motion(model, t, x, command, (*friction, *elastic))
     else:
         drives, qdd = _drives(model, command, qd, currents, heat), None
     found = read_channels(model, q, qd, drives, qdd)
@@ -125,59 +129,76 @@ def run_piece(
     force: Float[Array, "samples coordinates"],
     time: Float[Array, " samples"],
     sample_time: float,
-    substeps: Int[Array, ""],
+    stepping: Stepping,
 ) -> Response:
-    """One piece from `start`, by classical Runge-Kutta steps of `sample_time / substeps`.
+    """One piece from `start`, by classical Runge-Kutta steps.
 
     `force`: on every coordinate beside all else, held over each interval.
     """
-    h = sample_time / substeps
+    h = sample_time / stepping.substeps
     some = instruments.lag > 0
     safe = jnp.where(some, instruments.lag, 1.0)
     decay = tuple(jnp.where(some, jnp.exp(-sample_time / safe), 0.0))
     mean = tuple(jnp.where(some, 1 - jnp.exp(-sample_time / safe), 1.0) * instruments.lag / sample_time)
     gain, bias, drift = (tuple(part) for part in instruments[:3])
-    count = len(channels)
+    count, joints = len(channels), len(model.joints)
 
     def moved(x, slope, by):
         return tuple(a + by * b for a, b in zip(x, slope, strict=True))
 
-    def step(x, inputs):
+    def step(carry, inputs):
+        x, friction = carry
         u, f, t = inputs
-        before = truth(model, channels, t, x, u)
+        before = truth(model, channels, t, x, u, friction)
         shown = x[-count:]
         reading = tuple(g * y + b + d * t for g, y, b, d in zip(gain, shown, bias, drift, strict=True))
 
-        def stage(carry, weights):
-            # classical Runge-Kutta as a scan over its stages, which compiles once for all four
-            y, slope, total = carry
-            ahead, share = weights
-            slope = derivative(model, t + ahead * h, moved(y, slope, ahead * h), u, f)
-            return (y, slope, moved(total, slope, share)), None
+        def one_pass(y, dry):
+            total = (*(a + b for a, b in zip(f, dry, strict=False)), *f[joints:])
 
-        def substep(_, y):
+            def stage(carry, weights):
+                # classical Runge-Kutta as a scan over its stages, which compiles once for all four
+                z, slope, mean = carry
+                ahead, share = weights
+                slope = derivative(model, t + ahead * h, moved(z, slope, ahead * h), u, total)
+                return (z, slope, moved(mean, slope, share)), None
+
             zero = tuple(jnp.zeros_like(v) for v in y)
             weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
-            (_, _, total), _ = jax.lax.scan(stage, (y, zero, zero), weights)
-            return moved(y, total, h)
+            (_, _, slope), _ = jax.lax.scan(stage, (y, zero, zero), weights)
+            return moved(y, slope, h)
 
-        y = jax.lax.fori_loop(0, substeps, substep, x)
-        after = truth(model, channels, t + sample_time, y, u)
+        def substep(_, carry):
+            y, _ = carry
+
+            def again(_, carry):
+                _, _, agreed = carry
+                end = one_pass(y, agreed)
+                starts, ends = (model.split(z[model.size : 2 * model.size])[0] for z in (y, end))
+                return end, agreed, dry_friction(model, stepping, starts, ends, agreed, h)
+
+            none = (jnp.zeros_like(h),) * joints
+            end, dry, _ = jax.lax.fori_loop(0, stepping.passes, again, (y, none, none))
+            return end, dry
+
+        y, friction = jax.lax.fori_loop(0, stepping.substeps, substep, (x, friction))
+        after = truth(model, channels, t + sample_time, y, u, friction)
         lagged = tuple(
             a * s + (m - a) * b + (1 - m) * c
             for a, s, m, b, c in zip(decay, shown, mean, before, after, strict=True)
         )
-        return (*y[:-count], *lagged), (reading, x)
+        return ((*y[:-count], *lagged), friction), (reading, x)
 
     inputs = (tuple(command.T), tuple(force.T), time)
-    end, (reading, states) = jax.lax.scan(step, tuple(start), inputs)
+    still = (jnp.zeros_like(time[0]),) * joints
+    (end, _), (reading, states) = jax.lax.scan(step, (tuple(start), still), inputs)
     return Response(jnp.stack(reading, -1), jnp.stack(end), jnp.stack(states, -1))
 
 
 def _lanes(model, instruments, channels, starts, force, pieces: Pieces) -> Response:
     def one(start, command, force, time):
         return run_piece(
-            model, instruments, channels, start, command, force, time, pieces.sample_time, pieces.substeps
+            model, instruments, channels, start, command, force, time, pieces.sample_time, pieces.stepping
         )
 
     return jax.vmap(one)(starts, pieces.command, force, pieces.time)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Candidate, Motion
-from .shooting import Linearised, Normal, Problem, Run, solve
+from .normal import Normal, solve
+from .shooting import Linearised, Problem, Run
 
 
 @dataclass(frozen=True)

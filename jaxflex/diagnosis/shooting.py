@@ -13,7 +13,7 @@ import dataclasses
 import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import equinox as eqx
@@ -23,12 +23,24 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..arm.arm import Arm
+from .delay import delayed
+from .normal import Normal, solve
 from .parameters import Parameters
-from .plant import Direction, Instruments, Pieces, Response, respond, slopes
+from .plant import Direction, Instruments, Pieces, Response, Stepping, respond, slopes
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
-SLOPE_SUBSTEPS = 4  # enough for slopes, which chord steps make up for
-LANES = 12  # directions differentiated side by side: one compiled program whatever their number
+LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
+DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
+LANES = 10  # directions differentiated side by side: one compiled program whatever their number
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of every piece, in units of the noise, where they were last taken."""
+
+    by_start: np.ndarray  # (pieces, samples, channels, states)
+    end_by_start: np.ndarray  # (pieces, states, states)
+    by_column: dict[int, tuple[np.ndarray, np.ndarray]]  # readings (pieces, samples, channels), ends
 
 
 @dataclass
@@ -40,6 +52,7 @@ class Run:
     reading: np.ndarray  # (pieces, samples, channels)
     valid: np.ndarray  # (pieces, samples)
     starts: np.ndarray  # (pieces, states)
+    slopes: Slopes | None = None
 
     @property
     def pieces(self) -> int:
@@ -73,62 +86,8 @@ class Linearised:
     gap: np.ndarray  # (pieces, states): where a piece ends, less where the next begins
 
 
-@dataclass
-class Normal:
-    """Least squares in the columns alone, the starts eliminated: `N d = g`.
-
-    `cost` is that of the starts and columns as they are.
-    """
-
-    matrix: np.ndarray
-    vector: np.ndarray
-    cost: float
-    count: int
-    back: list = field(default_factory=list)  # what gives the starts once d is known
-
-    def __add__(self, other: "Normal") -> "Normal":
-        return Normal(
-            self.matrix + other.matrix,
-            self.vector + other.vector,
-            self.cost + other.cost,
-            self.count + other.count,
-            [*self.back, *other.back],
-        )
-
-
-def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """`matrix^-1 right` of a symmetric matrix, or the smallest of its solutions where it is singular."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    tidy = matrix / np.outer(scale, scale)
-    tall = (right.T / scale).T
-    try:
-        found = np.linalg.solve(tidy, tall)
-    except np.linalg.LinAlgError:
-        found = np.full_like(tall, np.nan)
-    if not np.isfinite(found).all():
-        if not np.isfinite(tidy).all() or not np.isfinite(tall).all():
-            return np.full_like(tall, np.inf)
-        found = np.linalg.lstsq(tidy, tall, rcond=1e-13)[0]
-    return (found.T / scale).T
-
-
-def delayed(times: np.ndarray, command: np.ndarray, delay: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """A command held between samples, as its mean over each interval when late by `delay` [s]; and its slope."""
-    knots = np.append(times, times[-1] + dt)
-    area = np.concatenate([[0.0], np.cumsum(command) * dt])
-    first = command[0]
-
-    def upto(t):
-        return np.where(t < knots[0], first * (t - knots[0]), np.interp(t, knots, area))
-
-    def at(t):
-        index = np.clip(np.floor((t - knots[0]) / dt + 1e-9).astype(int), 0, len(command) - 1)
-        return command[index]
-
-    mean = (upto(knots[1:] - delay) - upto(knots[:-1] - delay)) / dt
-    # the slope just above the delay: at no delay the interval begins to see the command before
-    slope = -(at(knots[1:] - delay - 1e-9 * dt) - at(knots[:-1] - delay - 1e-9 * dt)) / dt
-    return mean, slope
+def _stacked(columns: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+    return np.stack(columns, -1) if columns else np.zeros((*shape, 0))
 
 
 @eqx.filter_jit
@@ -158,24 +117,30 @@ class Problem:
             for joint in range(len(setting.parameters.arm.joints))
         ]
 
-    def substeps(self, vector: np.ndarray) -> int:
-        """Integration steps in a sample interval for these parameters."""
+    def stepping(self, vector: np.ndarray) -> Stepping:
+        """How a sample interval is integrated for these parameters."""
         s = self.setting
-        return s.parameters.substeps(vector, s.sample_time, s.substeps)
+        dry = s.parameters.has_dry_friction(vector)
+        joints = len(s.parameters.lightness)
+        return Stepping(
+            jnp.asarray(max(s.substeps, DRY_SUBSTEPS) if dry else s.substeps),
+            # joints that stick move one another until they agree
+            jnp.asarray((1 + joints if joints > 1 else 2) if dry else 1),
+            jnp.asarray(s.parameters.lightness),
+        )
 
-    def arm(self, vector: np.ndarray, substeps: int) -> Arm:
-        """The arm as it is integrated in so many steps a sample."""
-        step = self.setting.sample_time / substeps
-        return self.setting.parameters.build(jnp.asarray(vector), step)
+    def arm(self, vector: np.ndarray) -> Arm:
+        """The arm that a parameter vector stands for."""
+        return self.setting.parameters.build(jnp.asarray(vector))
 
-    def _tangents(self, vector: np.ndarray, directions: np.ndarray, substeps: int) -> Any:
-        step, at = self.setting.sample_time / substeps, jnp.asarray(vector)
+    def _tangents(self, vector: np.ndarray, directions: np.ndarray) -> Any:
+        at = jnp.asarray(vector)
 
         def along(direction):
-            moved = jax.jvp(lambda v: self.setting.parameters.build(v, step), (at,), (direction,))[1]
+            moved = jax.jvp(self.setting.parameters.build, (at,), (direction,))[1]
             return eqx.filter(moved, eqx.is_inexact_array)
 
-        return _assembled_along(self.arm(vector, substeps), jax.vmap(along)(jnp.asarray(directions)))
+        return _assembled_along(self.arm(vector), jax.vmap(along)(jnp.asarray(directions)))
 
     def instruments(self, vector: np.ndarray) -> Instruments:
         """The instruments that a parameter vector stands for."""
@@ -190,7 +155,7 @@ class Problem:
         gain, bias, drift, lag = (np.array(v, dtype=float) for v in values.values())
         return Instruments(1 + gain, bias, drift, lag)
 
-    def pieces(self, run: Run, vector: np.ndarray, substeps: int) -> tuple[Pieces, np.ndarray]:
+    def pieces(self, run: Run, vector: np.ndarray) -> tuple[Pieces, np.ndarray]:
         """The pieces of a run under the delays of `vector`, and the slope of commands with delay."""
         s = self.setting
         columns, rates = [], []
@@ -209,36 +174,68 @@ class Problem:
         time = run.times[0] + np.arange(total).reshape(shape) * s.sample_time
         command = np.stack([cut(c) for c in columns], -1)
         slope = np.stack([cut(c) for c in rates], -1)
-        return Pieces(jnp.asarray(command), jnp.asarray(time), s.sample_time, jnp.asarray(substeps)), slope
+        stepping = self.stepping(vector)
+        return Pieces(jnp.asarray(command), jnp.asarray(time), s.sample_time, stepping), slope
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
-        substeps = self.substeps(vector)
-        model = self.arm(vector, substeps).assemble()
-        pieces, _ = self.pieces(run, vector, substeps)
+        pieces, _ = self.pieces(run, vector)
         found = respond(
-            model, self.instruments(vector), self.setting.channels, jnp.asarray(run.starts), pieces
-        )
+            self.arm(vector).assemble(), self.instruments(vector), self.setting.channels,
+            jnp.asarray(run.starts), pieces,
+        )  # fmt: skip
         return Response(*(np.asarray(part) for part in found))
 
     def linearise(
-        self, run: Run, vector: np.ndarray, columns: list[int], forcing: np.ndarray | None = None
+        self,
+        run: Run,
+        vector: np.ndarray,
+        columns: list[int],
+        forcing: np.ndarray | None = None,
+        fresh: bool = True,
     ) -> Linearised:
         """A run about its starts and `vector`, with slopes by the parameters at `columns`.
 
         `forcing`: `(more, pieces, samples, joints + coordinates)` of further columns, each a
-        sequence of changes of the commands and of forces on the coordinates.
+        sequence of changes of the commands and of forces on the coordinates. Unless `fresh`,
+        slopes that the run has from before serve again.
         """
+        old = None if fresh else run.slopes
+        known = {} if old is None else old.by_column
+        missing = [column for column in dict.fromkeys(columns) if column not in known]
+        states = run.starts.shape[1]
+        reading, end = self._slopes(run, vector, old is None, missing, forcing)
+        if old is None:
+            by_start, end_by_start = reading[..., :states], end[..., :states]
+            reading, end = reading[..., states:], end[..., states:]
+        else:
+            by_start, end_by_start = old.by_start, old.end_by_start
+        found = {column: (reading[..., k], end[..., k]) for k, column in enumerate(missing)}
+        run.slopes = Slopes(by_start, end_by_start, known | found)
+        residual, gap = self._misfit(run, vector)
+        by_column = [run.slopes.by_column[column] for column in columns]
+        forced = range(len(missing), reading.shape[-1])
+        return Linearised(
+            residual,
+            by_start,
+            _stacked([a for a, _ in by_column] + [reading[..., k] for k in forced], residual.shape),
+            end_by_start,
+            _stacked([b for _, b in by_column] + [end[..., k] for k in forced], gap.shape),
+            gap,
+        )
+
+    def _slopes(
+        self, run: Run, vector: np.ndarray, starts: bool, columns: list[int], forcing: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Slopes of readings and ends by the starts, then by columns, then by forcing; last axis."""
         s = self.setting
-        substeps = min(self.substeps(vector), max(SLOPE_SUBSTEPS, s.substeps))
-        model = self.arm(vector, substeps).assemble()
-        instruments = self.instruments(vector)
-        pieces, delay_slope = self.pieces(run, vector, substeps)
-        states, joints, size = run.starts.shape[1], run.command.shape[1], model.size
+        model, instruments = self.arm(vector).assemble(), self.instruments(vector)
+        pieces, delay_slope = self.pieces(run, vector)
+        states, joints, size = run.starts.shape[1] if starts else 0, run.command.shape[1], model.size
         more = 0 if forcing is None else len(forcing)
         total = states + len(columns) + more
         lanes = -(-total // LANES) * LANES
-        start = np.zeros((lanes, states))
+        start = np.zeros((lanes, run.starts.shape[1]))
         start[np.arange(states), np.arange(states)] = 1.0
         unit = np.zeros((lanes, len(vector)))
         command = np.zeros((lanes, run.pieces, s.length, joints))
@@ -254,24 +251,21 @@ class Problem:
 
         def some(first):
             part = slice(first, first + LANES)
-            arrays = self._tangents(vector, unit[part], substeps)
-            moved = self._instruments_along(unit[part])
             direction = Direction(
-                arrays, moved, jnp.asarray(start[part, None, :]), jnp.asarray(command[part]),
-                jnp.asarray(force[part]),
+                self._tangents(vector, unit[part]), self._instruments_along(unit[part]),
+                jnp.asarray(start[part, None, :]), jnp.asarray(command[part]), jnp.asarray(force[part]),
             )  # fmt: skip
             found = slopes(model, instruments, s.channels, jnp.asarray(run.starts), pieces, direction)
             return np.asarray(found.reading), np.asarray(found.end)
 
+        if lanes == 0:
+            shape = run.reading.shape
+            return np.zeros((*shape, 0)), np.zeros((*run.starts.shape, 0))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             readings, ends = zip(*pool.map(some, range(0, lanes, LANES)), strict=True)
         reading = np.moveaxis(np.concatenate(readings)[:total], 0, -1) / s.noise[:, None]
         end = np.moveaxis(np.concatenate(ends)[:total], 0, -1)
-        residual, gap = self._misfit(run, vector)
-        reading = np.where(run.valid[..., None, None], reading, 0.0)
-        return Linearised(
-            residual, reading[..., :states], reading[..., states:], end[..., :states], end[..., states:], gap
-        )
+        return np.where(run.valid[..., None, None], reading, 0.0), end
 
     def _misfit(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual of every reading in units of the noise, and the gap after every piece."""
@@ -294,7 +288,7 @@ class Problem:
         s = self.setting
         columns = linear.by_column.shape[-1]
         states = run.starts.shape[1]
-        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0)
+        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0, 0)
         cuts = np.unique(
             np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
         )
@@ -330,6 +324,7 @@ class Problem:
                 gram[b, b] - gram[b, a] @ solved[:, :-1],
                 gram[b, -1] - gram[b, a] @ solved[:, -1],
                 gram[-1, -1],
+                float(gram[a, -1] @ solved[:, -1]),
                 int(run.valid[first:last].sum()) * len(s.channels),
                 [(run, kept, solved)],
             )
@@ -346,3 +341,20 @@ class Problem:
         """The same slopes about where the run is now."""
         residual, gap = self._misfit(run, vector)
         return dataclasses.replace(linear, residual=residual, gap=gap)
+
+    def mend(self, run: Run, vector: np.ndarray) -> bool:
+        """Move starts that are lost to where the piece before ends, if that fits better; true if any was.
+
+        A piece that begins near rest under friction may settle on the wrong side of it.
+        """
+        response = self.predict(run, vector)
+        other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], response.end[:-1]]))
+        here, there = (
+            np.mean(
+                (np.where(run.valid[..., None], run.reading - reading, 0.0) / self.setting.noise) ** 2, (1, 2)
+            )
+            for reading in (response.reading, self.predict(other, vector).reading)
+        )
+        better = (here > LOST_PIECE) & (there < here / LOST_PIECE)
+        run.starts = np.where(better[:, None], other.starts, run.starts)
+        return bool(better.any())

@@ -19,6 +19,7 @@ from .drive import TorqueConstant as TorqueConstant
 from .drive import VoltageDeadZone as VoltageDeadZone
 from .drive import VoltageSaturation as VoltageSaturation
 from .drive import WindingHeating as WindingHeating
+from .friction import AbstractDryFriction as AbstractDryFriction
 from .friction import AsymmetricFriction as AsymmetricFriction
 from .friction import CoulombFriction as CoulombFriction
 from .friction import QuadraticDrag as QuadraticDrag

@@ -1,5 +1,6 @@
 """Friction at a joint beyond the viscous term: torques that depend on its rate."""
 
+from abc import abstractmethod
 from typing import ClassVar
 
 import equinox as eqx
@@ -16,7 +17,17 @@ def smooth_sign(rate: Scalar, transition_rate: Scalar) -> Scalar:
     return jnp.tanh(rate / transition_rate)
 
 
-class CoulombFriction(AbstractJointEffect):
+class AbstractDryFriction(AbstractJointEffect):
+    """Friction that changes sign with the rate, within a `transition_rate` [rad/s] of rest."""
+
+    transition_rate: eqx.AbstractVar[Scalar]
+
+    @abstractmethod
+    def resistance(self, rate: Scalar, side: float) -> Scalar:
+        """Torque [N m] against sliding at the speed `rate`, forwards (`side` 1) or backwards (-1)."""
+
+
+class CoulombFriction(AbstractDryFriction):
     """Dry friction `-T_c sign(rate)`: `torque` T_c [N m], `transition_rate` [rad/s]."""
 
     torque: Scalar = eqx.field(converter=scalar)
@@ -27,12 +38,16 @@ class CoulombFriction(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s"}
     looks_like: ClassVar[str] = "a torque that jumps as the joint changes direction and is flat in between"
 
+    def resistance(self, rate: Scalar, side: float) -> Scalar:
+        """`T_c` [N m]."""
+        return self.torque
+
     def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-T_c tanh(rate / v_t)` [N m]."""
         return -self.torque * smooth_sign(rate, self.transition_rate)
 
 
-class StribeckFriction(AbstractJointEffect):
+class StribeckFriction(AbstractDryFriction):
     """Dry friction that is higher near rest, `-(T_c + T_s exp(-(rate/v_s)^2)) sign(rate)`.
 
     `torque` T_s [N m] is the excess of breakaway over the `level` T_c [N m] that it fades
@@ -54,13 +69,16 @@ class StribeckFriction(AbstractJointEffect):
     }
     looks_like: ClassVar[str] = "a torque against motion that peaks near rest and fades with speed"
 
+    def resistance(self, rate: Scalar, side: float) -> Scalar:
+        """`T_c + T_s exp(-(rate / v_s)^2)` [N m]."""
+        return self.level + self.torque * jnp.exp(-((rate / self.stribeck_rate) ** 2))
+
     def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-(T_c + T_s exp(-(rate / v_s)^2)) tanh(rate / v_t)` [N m]."""
-        fade = jnp.exp(-((rate / self.stribeck_rate) ** 2))
-        return -(self.level + self.torque * fade) * smooth_sign(rate, self.transition_rate)
+        return -self.resistance(rate, 1.0) * smooth_sign(rate, self.transition_rate)
 
 
-class AsymmetricFriction(AbstractJointEffect):
+class AsymmetricFriction(AbstractDryFriction):
     """Dry friction that differs with direction: `-T_a` while turning either way, `torque` T_a [N m].
 
     Forward motion feels T_a more, backward motion T_a less than the symmetric friction
@@ -74,6 +92,10 @@ class AsymmetricFriction(AbstractJointEffect):
     place: ClassVar[str] = "joint"
     units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s"}
     looks_like: ClassVar[str] = "a torque of one sign while the joint turns either way, gone at rest"
+
+    def resistance(self, rate: Scalar, side: float) -> Scalar:
+        """`T_a` forwards, `-T_a` backwards [N m]."""
+        return side * self.torque
 
     def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-T_a tanh(rate / v_t)^2` [N m]."""

@@ -16,6 +16,7 @@ from ..drive import (
     effect_torques,
     initial_currents,
     initial_drive_memory,
+    joint_effects,
 )
 from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
@@ -93,7 +94,7 @@ class Plant(eqx.Module):
         """`q''` of `M q'' + C q' + g + D q' = tau` (Ahmad et al. (27))."""
         angles, _ = self.model.split(state.q)
         rates, _ = self.model.split(state.qd)
-        extra = effect_torques(self.model, angles, rates, t)
+        extra = effect_torques(joint_effects(self.model), angles, rates, t)
         torques = tuple(map(lambda a, b: a + b, drives.torque, extra))
         if self.disturbance is not None:
             torques = tuple(map(lambda a, b: a + b, torques, self.disturbance(t)))
