@@ -158,7 +158,16 @@ class AssembledArm(eqx.Module):
         zeros = (jnp.zeros_like(self.joints[0].hub_inertia),) * len(self.links)
         return zeros + tuple(k for link in self.links for k in link.stiffness)
 
-    def damping(self) -> tuple[Scalar, ...]:
-        """Viscous damping of every coordinate: b [N m s/rad], then D_k [N s/m]."""
-        joints = tuple(joint.viscous_friction for joint in self.joints)
-        return joints + tuple(d for link in self.links for d in link.damping)
+    def damping(self, q: tuple | None = None) -> tuple[Scalar, ...]:
+        """Viscous damping of every coordinate: b [N m s/rad], then D_k [N s/m].
+
+        The flanks of a play damp while they touch, which is a matter of `q` (None: they do).
+        """
+        found = [joint.viscous_friction for joint in self.joints]
+        _, etas = (None, [None] * len(self.links)) if q is None else self.split(q)
+        for link, joint, eta in zip(self.links, self.joints, etas, strict=True):
+            found += link.damping
+            if link.loose:
+                touching = 1.0 if eta is None else (joint.pressed(eta[-1]) > 0) * 1.0
+                found[-1] = joint.contact_damping * touching
+        return tuple(found)

@@ -44,7 +44,12 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
             drawn, spun = half_form(short.mean, eta, eta), half_form(short.moment, eta, eta)
             drawing = 2 * half_form(short.mean, eta, eta_rate)
             twice = twice - 2 * (u * drawing + omega * (v * drawn + omega * spun))
-        twice = twice + joint.hub_inertia * omega * omega
+        if link.loose:
+            beyond = omega + eta_rate[-1]
+            share = joint.motor_share
+            twice = twice + joint.hub_inertia * (share * omega * omega + (1 - share) * beyond * beyond)
+        else:
+            twice = twice + joint.hub_inertia * omega * omega
         twice = twice + joint.reflected_inertia * rates[i] * rates[i]
         if i > 0:
             twice = twice + joint.hub_mass * (u * u + v * v)
@@ -60,8 +65,8 @@ def potential_energy(model: AssembledArm, q: tuple) -> Scalar:
     energy = jnp.zeros_like(model.arm.payload.mass)
     for link, joint, eta in zip(model.links, model.joints, etas, strict=True):
         energy = energy + 0.5 * dot(link.stiffness, tuple(e * e for e in eta))
-        if joint.play is not None and joint.contact_stiffness is not None and link.loose:
-            pressed = jnp.maximum(jnp.abs(eta[-1]) - joint.play / 2, 0.0)
+        if link.loose and joint.contact_stiffness is not None:
+            pressed = joint.pressed(eta[-1])
             energy = energy + 0.5 * joint.contact_stiffness * pressed * pressed
     if model.arm.gravity is None and model.arm.side_gravity is None:
         return energy

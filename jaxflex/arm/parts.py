@@ -1,6 +1,7 @@
 """The parts of an arm as an engineer describes them: links, joints, payload."""
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
 from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
@@ -124,10 +125,11 @@ class Joint(eqx.Module):
     - `rotor_inertia` I_r [kg m^2], turning at the gear ratio times the joint's rate
       (Ahmad et al. (7))
     - `motor`: a `DCMotor`, or None for a joint driven by a torque
-    - `compliance` [rad/(N m)] of the spring between motor and link; the hub inertia stays
-      on the motor's side, and so do the joint's angle and rate
-    - `play` [rad] between motor and link (None: no play), `contact_stiffness` [N m/rad]
-      of its flanks
+    - `compliance` [rad/(N m)] of the spring between motor and link, which follows at once;
+      the hub inertia stays on the motor's side, and so do the joint's angle and rate
+    - `play` [rad] between motor and link (None: they are one), `contact_stiffness`
+      [N m/rad] and `contact_damping` [N m s/rad] of its flanks; without a gap these are a
+      spring and a damper. Of the hub inertia `motor_share` stays on the motor's side
     """
 
     hub_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
@@ -138,6 +140,13 @@ class Joint(eqx.Module):
     compliance: Scalar = eqx.field(converter=scalar, default=0.0)
     play: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     contact_stiffness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    contact_damping: Scalar = eqx.field(converter=scalar, default=0.0)
+    motor_share: Scalar = eqx.field(converter=scalar, default=1.0)
+
+    def pressed(self, twist: Scalar) -> Scalar:
+        """How far [rad] the flanks of the play are pressed together at a `twist` of the link."""
+        assert self.play is not None
+        return jnp.maximum(jnp.abs(twist) - self.play / 2, 0.0)
 
     @property
     def reflected_inertia(self) -> Scalar:

@@ -14,17 +14,37 @@ CHORDS = 5  # steps with the same slopes; each needs only a run of the model
 MOST = 15  # iterations, however well they do
 FAITHFUL = 0.1  # of a fall of the cost: slopes that foretell it better than that need no renewal
 SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
+WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """The parameters that a fit moves: their places, with the prior and the bounds of each."""
+    """The parameters that a fit moves: their places, with the prior and the bounds of each.
+
+    A prior is normal, `precision (v - centre)^2`, and steep beyond `far` standard deviations.
+    """
 
     columns: tuple[int, ...]
     precision: np.ndarray
     centre: np.ndarray
     lowest: np.ndarray
+    far: np.ndarray
+
+    @staticmethod
+    def full(columns: list[int]) -> "Freedom":
+        """Of parameters without prior or bounds."""
+        zero = np.zeros(len(columns))
+        return Freedom(tuple(columns), zero, zero, zero - np.inf, zero + np.inf)
+
+    def prior(self, vector: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        """Cost of the prior, its pull on the parameters, and its precision, where they are."""
+        off = vector[list(self.columns)] - self.centre
+        edge = self.far / np.sqrt(np.maximum(self.precision, 1e-300))
+        beyond = np.sign(off) * np.maximum(np.abs(off) - edge, 0.0)
+        wall = WALL * self.precision
+        cost = float(self.precision @ off**2 + wall @ beyond**2)
+        return cost, -self.precision * off - wall * beyond, self.precision + wall * (beyond != 0)
 
 
 @dataclass
@@ -69,7 +89,7 @@ def fit(
     columns = list(freedom.columns)
 
     def prior(v):
-        return float(freedom.precision @ (v[columns] - freedom.centre) ** 2)
+        return freedom.prior(v)[0]
 
     def condensed(linears: list[Linearised]) -> Normal:
         parts = [problem.condense(r, part, horizon, damping) for r, part in zip(runs, linears, strict=True)]
@@ -94,9 +114,9 @@ def fit(
         while np.isfinite(before) and damping < STEEPEST:
             current, cost = first, before
             for chord in range(CHORDS):
-                matrix = current.matrix + np.diag(freedom.precision)
+                _, pull, precision = freedom.prior(vector)
+                matrix, pull = current.matrix + np.diag(precision), current.vector + pull
                 matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
-                pull = current.vector - freedom.precision * (vector[columns] - freedom.centre)
                 step = solve(matrix, pull) if columns else np.zeros(0)
                 if not np.isfinite(step).all():
                     cost = np.inf

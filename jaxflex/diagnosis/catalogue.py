@@ -84,7 +84,8 @@ def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float])
 
 def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> bool:
     if name == "backlash":
-        return False  # it changes the number of states, and one structure serves all hypotheses
+        # a joint that may come apart has a coordinate more; see `loose_joint`
+        return arm.joints[int(location.rpartition("_")[2]) - 1].play is not None
     if name in ("voltage_saturation", "voltage_dead_zone", "winding_heating"):
         return arm.drive == "voltage"
     if name == "torque_constant":

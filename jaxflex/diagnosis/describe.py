@@ -23,7 +23,7 @@ from .prepare import Prepared
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem, Run
 
-AT_FLOOR = 1.5  # misfit a reading, in units of the noise, up to which nothing is left
+AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]
@@ -88,8 +88,7 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
         if effect.effect == "periodic_disturbance"
         for name in effect.amplitudes
     ]
-    count = len(free)
-    held = Freedom(tuple(free), np.zeros(count), np.zeros(count), np.full(count, -np.inf))
+    held = Freedom.full(free)
     squares, predictions = [], []
     for run in runs:
         vector = hypothesis.fit.vector
@@ -136,7 +135,7 @@ def _verdict(outcome: Outcome, levels: list[float], gone: float) -> str:
 def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
     """Every parameter that was free, by its place in the vector."""
     found, parameters = hypothesis.fit, search.parameters
-    matrix = found.normal.matrix + np.diag(found.freedom.precision)
+    matrix = found.normal.matrix + np.diag(found.freedom.prior(found.vector)[2])
     scale = np.sqrt(np.clip(np.diag(matrix), 1e-300, None))
     inverse = np.linalg.pinv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
     spread = np.sqrt(np.clip(np.diag(inverse), 0, None) * max(found.level, 1.0))

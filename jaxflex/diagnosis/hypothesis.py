@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..effects import EFFECTS, AbstractBodyEffect, TorqueConstant
 from .calibrate import Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
@@ -19,6 +20,7 @@ HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # A model is never the plant. What it gets wrong shows more the longer it runs, and is no
 # missing effect: gains below this share of the readings, times the horizon, count as that.
 MODEL_ERROR = 0.002
+TRUSTED = 2.5  # standard deviations up to which a nominal parameter may leave its value freely
 CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
@@ -26,6 +28,7 @@ RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
 BARRED = 1e20  # precision that keeps a parameter where it is
+PARTS = (AbstractBodyEffect, TorqueConstant)  # effects that a nominal parameter could be bent to imitate
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
 
@@ -78,6 +81,7 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
     count = len(parameters.nominal)
     columns = list(range(count))
     precision, centre, lowest = [1.0] * count, [0.0] * count, [-np.inf] * count
+    far = [TRUSTED] * count
     taken = {effect.key for effect in effects}
     for part in parameters.effect:
         if part.effect == "centrifugal_stiffening" and (part.effect, part.location) not in taken:
@@ -98,7 +102,8 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
             precision.append(1 / (0.5 * value if value else 1.0) ** 2)
             centre.append(value)
             lowest.append(0.1 * value if value else -np.inf)
-    return Freedom(tuple(columns), np.array(precision), np.array(centre), np.array(lowest))
+    far += [np.inf] * (len(columns) - count)
+    return Freedom(tuple(columns), *(np.array(part) for part in (precision, centre, lowest, far)))
 
 
 def adopt(
@@ -144,8 +149,7 @@ class Search:
 
     def settle(self, vector: np.ndarray, horizon: int = 1) -> Fit:
         """The starts alone, parameters held."""
-        nothing = Freedom((), np.zeros(0), np.zeros(0), np.zeros(0))
-        return fit(self.problem, self.runs, vector, nothing, horizon, 2)
+        return fit(self.problem, self.runs, vector, Freedom.full([]), horizon, 2)
 
     def climb(
         self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],
@@ -205,7 +209,7 @@ class Search:
             with_candidates(self.problem, run, motion, vector, columns, tried)
             for run, motion in zip(self.runs, motions, strict=True)
         ]
-        pull = -free.precision * (vector[columns] - free.centre)
+        _, pull, prior = free.prior(vector)
         best: dict[tuple[str, str], Ranked] = {}
         for horizon in horizons:
             parts = [
@@ -213,7 +217,7 @@ class Search:
                 for run, (linear, _) in zip(self.runs, linears, strict=True)
             ]
             normal = sum(parts[1:], parts[0])
-            precision = free.precision.copy()
+            precision = prior.copy()
             if own:
                 # as if the effect were out: its own columns are given back to the residual, then barred
                 amplitudes = np.array([vector[columns[k]] for k in own[: len(instead.amplitudes)]])
@@ -229,6 +233,16 @@ class Search:
                 if kept is None or strength > kept.strength:
                     best[score.candidate.key] = Ranked(score.candidate, score.step, score.gain, strength)
         return sorted(best.values(), key=lambda ranked: -ranked.strength)
+
+    def parts(self, effects: tuple[Candidate, ...]) -> list[Ranked]:
+        """Every change of a part of the arm that is not yet in `effects`, at nothing."""
+        motion = Motion(self.problem, self.runs[0], self.parameters.start)
+        taken = {effect.key for effect in effects}
+        return [
+            Ranked(candidate, (0.0,) * len(candidate.amplitudes), 0.0, 0.0)
+            for candidate in candidates(self.parameters, motion, [])
+            if candidate.key not in taken and issubclass(EFFECTS[candidate.effect], PARTS)
+        ]
 
     def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
         names = (*effect.amplitudes, *effect.free)
@@ -265,5 +279,6 @@ class Outcome:
         self.nominal_starts = starts
         self.final = nominal
         self.final_starts = starts
+        self.level = np.inf  # misfit a reading over the longest horizon
         self.rivals: list[tuple[int, Hypothesis]] = []
         self.gains: list[float] = []

@@ -68,7 +68,7 @@ def separations(search: Search, final: Hypothesis, first: Candidate, second: Can
             continue
         columns = [*range(len(free.columns)), *range(rival.start, rival.stop)]
         inner = matrix[np.ix_(columns, columns)] + np.diag(
-            [*free.precision, *np.zeros(rival.stop - rival.start)]
+            [*free.prior(vector)[2], *np.zeros(rival.stop - rival.start)]
         )
         cross = matrix[np.ix_(columns, range(own.start, own.stop))]
         schur = matrix[own, own] - cross.T @ np.linalg.pinv(inner, hermitian=True) @ cross

@@ -167,7 +167,10 @@ def _nominal(file: ArmFile) -> list[Nominal]:
             add(f"damping_ratio{tail}", ["damping_ratio"], ratios[0], leaves)
     for i, joint in enumerate(arm.joints):
         tail = f"_{i + 1}" if len(arm.joints) > 1 else ""
-        for field in ("hub_inertia", "hub_mass", "viscous_friction", "rotor_inertia"):
+        fields = ["hub_inertia", "hub_mass", "viscous_friction", "rotor_inertia"]
+        if joint.play is not None:
+            fields += ["contact_stiffness", "contact_damping", "motor_share"]
+        for field in fields:
             if field == "hub_mass" and i == 0:
                 continue  # carried by the base
             leaf = (lambda a, i=i, field=field: getattr(a.joints[i], field), 1)

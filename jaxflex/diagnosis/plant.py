@@ -89,7 +89,7 @@ def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tup
     torques = tuple(a + b for a, b in zip(drives.torque, extra, strict=True))
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
-    total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(), qd, strict=True))
+    total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(q), qd, strict=True))
     return drives, accelerations(model, q, qd, total)
 
 

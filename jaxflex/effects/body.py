@@ -66,7 +66,8 @@ class JointFlexibility(AbstractBodyEffect):
     """A spring between motor and link: `compliance` [rad/(N m)], the inverse of its stiffness.
 
     The encoder sits on the motor, and the deflection of the link is measured from the
-    link's own root.
+    link's own root. The spring follows at once, unless the joint has a contact stiffness:
+    then motor and link move apart, and the spring comes in series with it.
     """
 
     compliance: Scalar = eqx.field(converter=scalar)
@@ -78,6 +79,10 @@ class JointFlexibility(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with the spring at its joint."""
+        stiffness = arm.joints[self.index].contact_stiffness
+        if stiffness is not None:
+            softer = stiffness / (1 + stiffness * self.compliance)
+            return eqx.tree_at(lambda a: a.joints[self.index].contact_stiffness, arm, softer)
         return raised(arm, lambda a: a.joints[self.index].compliance, self.compliance)
 
 
@@ -159,7 +164,7 @@ class Gravity(AbstractBodyEffect):
 class Backlash(AbstractBodyEffect):
     """Play between motor and link: the link's root turns freely over a `gap` [rad], then hits.
 
-    `contact_stiffness` [N m/rad] of the flanks.
+    `contact_stiffness` [N m/rad] of the flanks, where the joint has none of its own.
     """
 
     gap: Scalar = eqx.field(converter=scalar)
@@ -172,8 +177,7 @@ class Backlash(AbstractBodyEffect):
 
     def apply(self, arm: Any) -> Any:
         """The arm with play in its joint."""
-        return eqx.tree_at(
-            lambda a: (a.joints[self.index].play, a.joints[self.index].contact_stiffness), arm,
-            (self.gap, self.contact_stiffness),
-            is_leaf=lambda x: x is None,
-        )  # fmt: skip
+        arm = raised(arm, lambda a: a.joints[self.index].play, self.gap)
+        if arm.joints[self.index].contact_stiffness is not None:
+            return arm
+        return raised(arm, lambda a: a.joints[self.index].contact_stiffness, self.contact_stiffness)

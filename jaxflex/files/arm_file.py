@@ -190,6 +190,8 @@ def _joint(fields: Fields, file: str, number: int) -> Joint:
         compliance=fields.not_negative("compliance"),
         play=fields.not_negative("play", None),
         contact_stiffness=fields.number("contact_stiffness"),
+        contact_damping=fields.not_negative("contact_damping"),
+        motor_share=fields.number("motor_share", 1.0),
         motor=None if motor is None else _motor(Fields(motor, f"joint {number}: motor: ", file)),
     )
     if joint.play is not None and joint.contact_stiffness is None:

@@ -100,7 +100,7 @@ class Plant(eqx.Module):
             torques = tuple(map(lambda a, b: a + b, torques, self.disturbance(t)))
         zero = jnp.zeros_like(angles[0])
         torques = torques + (zero,) * (self.model.size - len(torques))
-        damped = map(lambda d, v: d * v, self.model.damping(), state.qd)
+        damped = map(lambda d, v: d * v, self.model.damping(state.q), state.qd)
         force = tuple(map(lambda a, b: a - b, torques, damped))
         return accelerations(self.model, state.q, state.qd, force)
 

@@ -117,7 +117,7 @@ def test_a_fit_over_any_horizon_finds_the_parameters(prepared):
     found = make_problem(ArmFile(arm, {"default": 0.03}, None), [record(true, 3)[0]])
     names = found.problem.setting.parameters.names
     column = names.index("torque_constant")
-    free = Freedom((column,), np.ones(1), np.zeros(1), np.full(1, -np.inf))
+    free = Freedom((column,), np.ones(1), np.zeros(1), np.full(1, -np.inf), np.full(1, np.inf))
     vector = found.problem.setting.parameters.start
     for horizon in (1, 5, 1000):
         result = fit(found.problem, found.calibration, vector, free, horizon, 4)

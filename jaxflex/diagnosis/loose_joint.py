@@ -1,0 +1,104 @@
+"""Joints whose motor and link may come apart: backlash, and springs that do not follow at once.
+
+Such a joint has a coordinate more than the nominal one, and play leaves no trace in the slopes
+about a motion without it. So they are tried on an arm of their own, from several sizes, when
+nothing else explains what was measured.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..files.arm_file import ArmFile
+from ..files.recording import Recording
+from .calibrate import Freedom, fit
+from .catalogue import Candidate
+from .hypothesis import Hypothesis, Search, adopt, freedom
+from .parameters import Parameters
+from .prepare import Prepared, make_problem
+from .shooting import Run
+
+CONTACT = {  # value, and relative uncertainty
+    "contact_stiffness": (100.0, 0.5),  # N m/rad
+    "contact_damping": (0.01, 1.0),  # N m s/rad
+    "motor_share": (0.6, 0.3),
+}
+GAPS = (0.003, 0.012, 0.05)  # rad
+COMPLIANCES = (0.02, 0.1, 0.5)  # rad/(N m)
+
+
+def loosened(file: ArmFile, joint: int) -> ArmFile:
+    """The arm with motor and link of a joint apart, tied by a stiff spring."""
+    values = {name: value for name, (value, _) in CONTACT.items()}
+    joints = list(file.arm.joints)
+    joints[joint] = dataclasses.replace(joints[joint], play=0.0, **values)
+    arm = dataclasses.replace(file.arm, joints=tuple(joints))
+    spread = {name: spread for name, (_, spread) in CONTACT.items()}
+    return dataclasses.replace(file, arm=arm, uncertainty=file.uncertainty | spread)
+
+
+def trials(joint: int) -> list[tuple[Candidate, float]]:
+    """What may be between motor and link, with the size to start from."""
+    location = f"joint_{joint + 1}"
+    return [
+        *((Candidate("backlash", location, ("gap",)), gap) for gap in GAPS),
+        *((Candidate("joint_flexibility", location, ("compliance",)), size) for size in COMPLIANCES),
+    ]
+
+
+def loose_joints(
+    file: ArmFile, recordings: Sequence[Recording], say: Callable[[str], None]
+) -> "list[tuple[Prepared, Search, Hypothesis]]":
+    """For every joint that drives a flexible link, the best of its trials over the shortest horizon."""
+    found = []
+    for joint, link in enumerate(file.arm.links):
+        if link.modes == 0 or link.model != "assumed_modes" or file.arm.joints[joint].play is not None:
+            continue
+        prepared = make_problem(loosened(file, joint), recordings)
+        search = Search(prepared.problem, prepared.calibration, say)
+        nominal = search.settle(search.parameters.start)
+        starts = search.starts()
+        base = Hypothesis((), nominal, 1, {1: nominal.cost})
+        best = None
+        for candidate, size in trials(joint):
+            search.restart(starts)
+            if candidate.effect == "backlash":
+                for run in search.runs:
+                    press(search, run, joint, size)
+            vector = adopt(search.parameters, base.fit.vector, candidate, (size,))
+            vector = search.settle(vector).vector
+            own = contact_columns(search.parameters, candidate)
+            vector = fit(search.problem, search.runs, vector, own, 1).vector
+            tried = search.climb((candidate,), vector, to=1)
+            say(f"tried {candidate.effect} at {candidate.location} from {size:g}: {tried.fit.level:.3g}")
+            if best is None or tried.fit.cost < best[0].fit.cost:
+                best = tried, search.starts()
+        assert best is not None
+        search.restart(best[1])
+        found.append((prepared, search, best[0]))
+    return found
+
+
+def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
+    """Leave to move the contact alone, with the rest of the arm as it is."""
+    free = freedom(parameters, (candidate,))
+    names = parameters.names
+    own = [
+        k
+        for k, column in enumerate(free.columns)
+        if column >= len(parameters.nominal) or names[column].rstrip("_0123456789") in CONTACT
+    ]
+    return Freedom(
+        tuple(free.columns[k] for k in own),
+        *(part[own] for part in (free.precision, free.centre, free.lowest, free.far)),
+    )
+
+
+def press(search: Search, run: Run, joint: int, gap: float) -> None:
+    """Start every piece with the flank pressed that the moment of the bent link presses."""
+    model = search.parameters.arm.assemble()
+    first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
+    link = model.links[joint]
+    curvature = run.starts[:, first : first + link.shapes] @ np.array([float(c) for c in link.gauge_curvature])
+    run.starts[:, first + link.shapes - 1] = np.sign(curvature) * gap / 2
