@@ -144,9 +144,10 @@ class Joint(eqx.Module):
     motor_share: Scalar = eqx.field(converter=scalar, default=1.0)
 
     def pressed(self, twist: Scalar) -> Scalar:
-        """How far [rad] the flanks of the play are pressed together at a `twist` of the link."""
+        """How far [rad] the flanks of the play are pressed together at a `twist` of the link, signed."""
         assert self.play is not None
-        return jnp.maximum(jnp.abs(twist) - self.play / 2, 0.0)
+        gap = self.play / 2
+        return jnp.where(jnp.abs(twist) < gap, 0.0, twist - jnp.sign(twist) * gap)
 
     @property
     def reflected_inertia(self) -> Scalar:

@@ -29,6 +29,7 @@ INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and pa
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
 BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant)  # effects that a nominal parameter could be bent to imitate
+RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
 
@@ -161,8 +162,15 @@ class Search:
         for horizon in HORIZONS:
             if horizon > to:
                 break
-            found = fit(self.problem, self.runs, vector, free, horizon, iterations)
-            vector = found.vector
+            if found is not None:
+                for run in self.runs:
+                    self.problem.join(run, vector)
+            starts = self.starts()
+            longer = fit(self.problem, self.runs, vector, free, horizon, iterations)
+            if found is not None and not longer.level < RUNAWAY * (1 + found.level):
+                self.restart(starts)  # the motion cannot be followed for so long
+                break
+            found, vector = longer, longer.vector
             costs[horizon] = found.cost
             if found.level > ceiling:
                 break

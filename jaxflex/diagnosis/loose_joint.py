@@ -6,6 +6,7 @@ nothing else explains what was measured.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -21,11 +22,12 @@ from .shooting import Run
 
 CONTACT = {  # value, and relative uncertainty
     "contact_stiffness": (100.0, 0.5),  # N m/rad
-    "contact_damping": (0.01, 1.0),  # N m s/rad
+    "contact_damping": (0.03, 1.0),  # N m s/rad
     "motor_share": (0.6, 0.3),
 }
-GAPS = (0.003, 0.012, 0.05)  # rad
+GAPS = (0.002, 0.004, 0.008, 0.016, 0.032, 0.064)  # rad
 COMPLIANCES = (0.02, 0.1, 0.5)  # rad/(N m)
+FITTED = 3  # of the trials, those that fit best as they are
 
 
 def loosened(file: ArmFile, joint: int) -> ArmFile:
@@ -57,23 +59,27 @@ def loose_joints(
             continue
         prepared = make_problem(loosened(file, joint), recordings)
         search = Search(prepared.problem, prepared.calibration, say)
-        nominal = search.settle(search.parameters.start)
-        starts = search.starts()
-        base = Hypothesis((), nominal, 1, {1: nominal.cost})
-        best = None
-        for candidate, size in trials(joint):
+        straight = search.settle(search.parameters.start)
+        places = [(straight.vector, search.starts())]
+        bent = search.climb((), straight.vector, to=1)
+        places.append((bent.fit.vector, search.starts()))
+        tried = []
+        for (candidate, size), (vector, starts) in itertools.product(trials(joint), places):
             search.restart(starts)
             if candidate.effect == "backlash":
                 for run in search.runs:
                     press(search, run, joint, size)
-            vector = adopt(search.parameters, base.fit.vector, candidate, (size,))
-            vector = search.settle(vector).vector
+            settled = search.settle(adopt(search.parameters, vector, candidate, (size,)))
+            tried.append((settled.cost, len(tried), candidate, settled.vector, search.starts()))
+        best = None
+        for _, _, candidate, vector, starts in sorted(tried)[:FITTED]:
+            search.restart(starts)
             own = contact_columns(search.parameters, candidate)
-            vector = fit(search.problem, search.runs, vector, own, 1).vector
-            tried = search.climb((candidate,), vector, to=1)
-            say(f"tried {candidate.effect} at {candidate.location} from {size:g}: {tried.fit.level:.3g}")
-            if best is None or tried.fit.cost < best[0].fit.cost:
-                best = tried, search.starts()
+            vector = fit(prepared.problem, search.runs, vector, own, 1, 2).vector
+            fitted = search.climb((candidate,), vector, to=1, iterations=8)
+            say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
+            if best is None or fitted.fit.cost < best[0].fit.cost:
+                best = fitted, search.starts()
         assert best is not None
         search.restart(best[1])
         found.append((prepared, search, best[0]))
@@ -100,5 +106,7 @@ def press(search: Search, run: Run, joint: int, gap: float) -> None:
     model = search.parameters.arm.assemble()
     first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
     link = model.links[joint]
-    curvature = run.starts[:, first : first + link.shapes] @ np.array([float(c) for c in link.gauge_curvature])
+    curvature = run.starts[:, first : first + link.shapes] @ np.array(
+        [float(c) for c in link.gauge_curvature]
+    )
     run.starts[:, first + link.shapes - 1] = np.sign(curvature) * gap / 2

@@ -30,6 +30,7 @@ from .plant import Direction, Instruments, Pieces, Response, Stepping, respond, 
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
+SWEEPS = 2  # from piece to piece, when they are joined
 DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
 LANES = 10  # directions differentiated side by side: one compiled program whatever their number
 
@@ -347,14 +348,29 @@ class Problem:
 
         A piece that begins near rest under friction may settle on the wrong side of it.
         """
+        ends, here, there = self._from_before(run, vector)
+        better = (here > LOST_PIECE) & (there < here / LOST_PIECE)
+        run.starts = np.where(better[:, None], ends, run.starts)
+        return bool(better.any())
+
+    def join(self, run: Run, vector: np.ndarray) -> None:
+        """Move every start to where the piece before ends, unless that fits clearly worse.
+
+        What no reading sees of a start, such as where in its play a joint is, is then one
+        motion, which linear algebra can join over a longer horizon.
+        """
+        for _ in range(SWEEPS):
+            ends, here, there = self._from_before(run, vector)
+            run.starts = np.where((there < LOST_PIECE * here)[:, None], ends, run.starts)
+
+    def _from_before(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the pieces before end, and misfits of every piece from its own start and from there."""
         response = self.predict(run, vector)
         other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], response.end[:-1]]))
-        here, there = (
+        misfits = [
             np.mean(
                 (np.where(run.valid[..., None], run.reading - reading, 0.0) / self.setting.noise) ** 2, (1, 2)
             )
             for reading in (response.reading, self.predict(other, vector).reading)
-        )
-        better = (here > LOST_PIECE) & (there < here / LOST_PIECE)
-        run.starts = np.where(better[:, None], other.starts, run.starts)
-        return bool(better.any())
+        ]
+        return other.starts, misfits[0], misfits[1]
