@@ -41,12 +41,26 @@ from .references import Trapezoid as Trapezoid
 
 # Input shapers
 from .shapers import CLASSICAL as CLASSICAL
+from .shapers import SHAPERS as SHAPERS
 from .shapers import Shaped as Shaped
 from .shapers import Shaper as Shaper
 from .shapers import convolve as convolve
+from .shapers import cosine as cosine
 from .shapers import ei as ei
+from .shapers import half_sine as half_sine
+from .shapers import insensitivity as insensitivity
+from .shapers import load_shaper as load_shaper
+from .shapers import matched_s_curve as matched_s_curve
+from .shapers import on_samples as on_samples
+from .shapers import polynomial as polynomial
+from .shapers import residual_curve as residual_curve
 from .shapers import residual_ratio as residual_ratio
+from .shapers import si as si
+from .shapers import simultaneous as simultaneous
+from .shapers import um_zv as um_zv
+from .shapers import um_zvd as um_zvd
 from .shapers import unshaped as unshaped
+from .shapers import zero_placement as zero_placement
 from .shapers import zv as zv
 from .shapers import zvd as zvd
 from .shapers import zvdd as zvdd
