@@ -22,6 +22,13 @@ from .designs import stack as stack
 from .designs import textbook_pd as textbook_pd
 from .designs import unshaped_design as unshaped_design
 from .designs import with_duration as with_duration
+from .free_shaper import FreeMotion as FreeMotion
+from .free_shaper import TunedShaper as TunedShaper
+from .free_shaper import free_motion as free_motion
+from .free_shaper import shaped_residual as shaped_residual
+from .free_shaper import stack_motions as stack_motions
+from .free_shaper import tip_after as tip_after
+from .free_shaper import tune_shaper as tune_shaper
 from .minimise import Minimum as Minimum
 from .minimise import minimise as minimise
 

@@ -11,7 +11,7 @@ from .roots import root_between
 from .shaper import Shaper, mode
 
 Modes = Float[Array, " modes"]
-SAMPLES = 4000  # spacings tried
+SAMPLES = 2000  # spacings tried
 
 
 def zero_placement(frequencies: Modes, damping_ratios: Modes, spacing: ScalarLike) -> Shaper:
@@ -27,8 +27,9 @@ def zero_placement(frequencies: Modes, damping_ratios: Modes, spacing: ScalarLik
     for k in range(frequencies.shape[0]):
         rate, damped = mode(frequencies[k], damping_ratios[k])
         shrink = jnp.exp(-rate * h)
-        factor = jnp.stack([jnp.ones_like(h), -2 * shrink * jnp.cos(damped * h), shrink**2])
-        weights = jnp.convolve(weights, factor)
+        once, twice = -2 * shrink * jnp.cos(damped * h), shrink**2
+        longer = jnp.pad(weights, (0, 2))
+        weights = longer + once * jnp.roll(longer, 1) + twice * jnp.roll(longer, 2)
     return Shaper(weights / weights.sum(), h * jnp.arange(weights.shape[0]))
 
 
@@ -36,11 +37,12 @@ def zero_placement(frequencies: Modes, damping_ratios: Modes, spacing: ScalarLik
 def simultaneous(frequencies: Modes, damping_ratios: Modes) -> Shaper:
     """Zero placement at the shortest spacing at which no amplitude is negative.
 
-    Shorter than ZV shapers in series, and without damping, for two modes below three times
-    apart in frequency, the three impulses `1 / (f_1 + f_2)` apart that are the fewest
-    there can be (Hyde and Seering 1991; Pao 1999); for one mode it is ZV. Impulses of zero
-    stand between. Spacings up to the longest period are looked at; if none will do, the
-    one with the smallest negative amplitude is taken.
+    For two modes below three times apart in frequency it is shorter than two ZV in series,
+    by up to a quarter; farther apart, no longer to within a hundredth. Without damping it
+    is then three impulses `1 / (f_1 + f_2)` apart, the fewest there can be (Hyde and
+    Seering 1991; Pao 1999), with impulses of zero between; for one mode it is ZV.
+    Spacings up to the longest period are looked at; if none will do, the one with the
+    smallest negative amplitude is taken.
     """
     longest = 1 / jnp.min(frequencies)
 

@@ -25,7 +25,7 @@ from .extra_insensitive import chebyshev_impulses, ripple
 from .shaper import Shaper, decaying, mode
 from .zero_vibration import zv
 
-WIDEST = 1.0  # from half to one and a half times the frequency
+WIDEST = 0.9
 
 
 def si(
@@ -41,7 +41,7 @@ def si(
     where the mode is not damped. With damping each impulse is weighted with the decay of
     the mode, and less than the tolerance is left up to a damping ratio of 0.1.
 
-    **Raises** `ValueError` for an insensitivity not within 0 and 1, or a tolerance not
+    **Raises** `ValueError` for an insensitivity not within 0 and 0.9, or a tolerance not
     within 0.01 and 0.5.
     """
     if not 0 <= insensitivity <= WIDEST:
@@ -55,7 +55,8 @@ def si(
     humps, stretch, tops = 0, 0.0, np.zeros(0)
     while stretch * high > 2 - stretch * low or not humps:  # until the band of an EI shaper is wide enough
         humps += 1
-        _, tops, edge = (np.asarray(part) for part in ripple(humps + 1, tolerance))
+        with jax.ensure_compile_time_eval():
+            _, tops, edge = (np.asarray(part) for part in ripple(humps + 1, tolerance))
         stretch = float(edge) / low
     if tops[-1] <= stretch * high:
         amplitudes = chebyshev_impulses(humps + 1, scalar(tolerance))
