@@ -25,6 +25,7 @@ from .shapers import Shaper
 
 NODES = 40  # of a Gauss-Legendre rule, between two knots of the move
 POWERS = (8.0, 32.0, 128.0, 512.0, 2048.0)
+INSIDE = 0.1  # weight of the barrier, times the power
 
 
 class FreeMotion(eqx.Module):
@@ -98,7 +99,6 @@ def _values(free: Float[Array, " free"], impulses: int, duration: Scalar) -> Sha
     return Shaper(amplitudes, Delays(duration).value(free[impulses - 1 :]))
 
 
-@eqx.filter_jit
 def tune_shaper(
     motions: FreeMotion,
     duration: ScalarLike,
@@ -111,10 +111,15 @@ def tune_shaper(
     """The shaper of `duration` [s] with the least worst residual over the batch `motions`.
 
     The first start has equal gaps and binomial amplitudes, the others are scattered about
-    it; all are followed down at once by BFGS, at powers of the mean from 8 to 2048.
+    it; all are followed down at once by BFGS, at powers of the mean from 8 to 2048, each
+    with a barrier that fades as the power grows.
     `times` [s]: the instants after the move at which the tip is watched.
     """
-    length = scalar(duration)
+    return _tuned(motions, scalar(duration), times, impulses, starts, max_steps, seed)
+
+
+@eqx.filter_jit
+def _tuned(motions, length, times, impulses, starts, max_steps, seed) -> TunedShaper:
     binomial = jnp.ones(1)
     for _ in range(impulses - 1):
         binomial = jnp.convolve(binomial, jnp.full(2, 0.5))
@@ -139,7 +144,11 @@ def tune_shaper(
         # log-sum-exp over instants, rest included: a smooth form of each side's largest excursion
         tops = jax.nn.logsumexp(power * jnp.pad(sides, ((0, 0), (0, 0), (0, 1), (0, 0))), axis=2) / power
         boxes = jnp.sqrt(jnp.sum(jnp.sum(tops, axis=0) ** 2, axis=-1))
-        return jax.nn.logsumexp(power * boxes) / power * scale / reference
+        made = _values(free, impulses, length)
+        gaps = jnp.diff(made.delays) / length
+        # amplitudes and gaps that went to zero early would have no slope to come back by
+        inside = -jnp.sum(jnp.log(made.amplitudes)) - jnp.sum(jnp.log(gaps))
+        return jax.nn.logsumexp(power * boxes) / power * scale / reference + INSIDE / power * inside
 
     def descend(free):
         for power in POWERS:

@@ -11,8 +11,8 @@ from ..pictures import MEASURED, OURS, figure
 
 def draw_impulses(shown: dict) -> Figure:
     """Impulses of both over time."""
-    made, axes = figure(1, len(shown), height=3.0)
-    for axis, (name, (_, _, duration, _, best, shaper)) in zip(axes[0], shown.items(), strict=True):
+    made, axes = figure(2, 2, height=2.8)
+    for axis, (name, (_, _, duration, _, best, shaper)) in zip(axes.flat, shown.items(), strict=True):
         delays, amplitudes = np.array(best.impulses()).T
         for times, sizes, colour, marker, label in (
             (delays, amplitudes, MEASURED, "o", "optimum on a grid"),
@@ -22,7 +22,8 @@ def draw_impulses(shown: dict) -> Figure:
             axis.plot(times, sizes, marker, color=colour, markersize=6, label=label)
         axis.set_title(f"{name}, shaper of {duration:.3g} s", fontsize=10)
         axis.set_xlabel("delay [s]")
-    axes[0, 0].set_ylabel("amplitude [1]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("amplitude [1]")
     axes[0, 0].legend(fontsize=8, frameon=False)
     return made
 

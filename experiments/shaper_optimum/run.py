@@ -15,29 +15,39 @@ ARMS = Path(__file__).parents[1] / "arms"
 LENGTHS = (0.25, 0.5, 0.75, 1.0, 1.5)  # of the shaper, in periods of the lowest locked frequency
 WATCH = 3.0  # periods of it for which the tip is watched
 IMPULSES = 8
+STIFF = 1.5  # bandwidth of the stiff PD, in lowest locked frequencies: the links ring against it
 
 
-def loop(arm: jf.Arm, payloads: np.ndarray) -> tuple[ctl.FreeMotion, float]:
-    """What the standard move leaves for every payload under the textbook PD, and the locked period [s]."""
+def loop(arm: jf.Arm, payloads: np.ndarray, bandwidth: float | None) -> tuple[ctl.FreeMotion, float]:
+    """What the standard move leaves for every payload under a PD, and the locked period [s].
+
+    `bandwidth` of the PD as a multiple of the lowest locked frequency; a third by default.
+    """
     middle = arm.with_payload(float(np.median(payloads)))
     move = ctl.default_move(middle)
     pose = jnp.stack(move.stop)
-    pd = ctl.textbook_pd(middle, pose, feedforward=True)
+    locked = jf.locked_frequencies(middle, pose)[0]
+    omega = None if bandwidth is None else 2 * jnp.pi * locked * bandwidth
+    pd = ctl.textbook_pd(middle, pose, omega, feedforward=True)
     motions = [ctl.free_motion(arm.with_payload(float(p)), pd, move) for p in payloads]
-    return ctl.stack_motions(motions), 1 / float(jf.locked_frequencies(middle, pose)[0])
+    return ctl.stack_motions(motions), 1 / float(locked)
 
 
 def run(folder: Path, reduced: bool) -> dict:
     """How near does the gradient-tuned free shaper come to the best shaper there is?"""
     count, points = (3, 61) if reduced else (5, 161)
+    link, links = jf.load_arm(ARMS / "foldager_link.toml"), jf.ahmad_arm()
+    light, heavy = np.linspace(0.0, 0.04, count), np.linspace(0.0, 0.1, count)
     cases = {
-        "single link": (jf.load_arm(ARMS / "foldager_link.toml"), np.linspace(0.0, 0.04, count)),
-        "two-link arm": (jf.ahmad_arm(), np.linspace(0.0, 0.1, count)),
+        "single link": (link, light, None),
+        "single link, stiff joint": (link, light, STIFF),
+        "two-link arm": (links, heavy, None),
+        "two-link arm, stiff joints": (links, heavy, STIFF),
     }
     figures: dict = {}
     shown = {}
-    for name, (arm, payloads) in cases.items():
-        motions, period = loop(arm, payloads)
+    for name, (arm, payloads, bandwidth) in cases.items():
+        motions, period = loop(arm, payloads, bandwidth)
         times = jnp.linspace(0.0, WATCH * period, 121 if reduced else 241)
         rows = []
         for length in (LENGTHS[3],) if reduced else LENGTHS:
@@ -50,7 +60,7 @@ def run(folder: Path, reduced: bool) -> dict:
                 times,
                 IMPULSES,
                 starts=2 if reduced else 8,
-                max_steps=100 if reduced else 300,
+                max_steps=100 if reduced else 200,
             )
             if length == LENGTHS[3]:
                 shown[name] = (motions, payloads, duration, times, best, tuned.shaper)
