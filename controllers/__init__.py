@@ -27,6 +27,7 @@ from .free_shaper import TunedShaper as TunedShaper
 from .free_shaper import free_motion as free_motion
 from .free_shaper import shaped_residual as shaped_residual
 from .free_shaper import stack_motions as stack_motions
+from .free_shaper import step_motion as step_motion
 from .free_shaper import tip_after as tip_after
 from .free_shaper import tune_shaper as tune_shaper
 from .minimise import Minimum as Minimum
@@ -36,6 +37,9 @@ from .minimise import minimise as minimise
 from .pd import GAINS as GAINS
 from .pd import PD as PD
 from .pd import OpenLoop as OpenLoop
+from .recommend import Rated as Rated
+from .recommend import rate_shapers as rate_shapers
+from .recommend import recommend as recommend
 from .references import AbstractProfile as AbstractProfile
 from .references import BangBang as BangBang
 from .references import MinimumJerk as MinimumJerk

@@ -46,10 +46,7 @@ def free_motion(arm: Arm, controller: AbstractController, move: Move) -> FreeMot
     taken mode by mode between the knots of the move. Not for use under `jit`: the loop is
     taken apart into its eigenvectors.
     """
-    rest = jnp.stack(move.stop)
-    loop = linearise(arm, rest, controller, ("tip_x", "tip_y"))
-    poles, vectors = jnp.linalg.eig(loop.A)
-    into = jnp.linalg.solve(vectors, loop.B.astype(vectors.dtype))
+    poles, into, out = _modal(arm, controller, jnp.stack(move.stop))
 
     def deviation(t):
         setpoint = move.setpoint(t)
@@ -61,12 +58,29 @@ def free_motion(arm: Arm, controller: AbstractController, move: Move) -> FreeMot
     low, width = knots[:-1, None], jnp.diff(knots)[:, None]
     times = (low + width * (jnp.asarray(places) + 1) / 2).ravel()
     shares = (width / 2 * jnp.asarray(weights)).ravel()
-    pushed = into @ jax.vmap(deviation)(times).T
+    pushed = into @ jax.jit(jax.vmap(deviation))(times).T
     end = move.end()
-    first = -into @ deviation(knots[0]) / poles
-    state = first * jnp.exp(poles * (end - knots[0]))
+    state = -into @ deviation(knots[0]) / poles * jnp.exp(poles * (end - knots[0]))
     state = state + jnp.sum(shares * jnp.exp(poles[:, None] * (end - times)) * pushed, axis=1)
-    return FreeMotion(poles, (loop.C @ vectors) * state)
+    return FreeMotion(poles, out * state)
+
+
+def step_motion(
+    arm: Arm, controller: AbstractController, start: Float[Array, " joints"], stop: Float[Array, " joints"]
+) -> FreeMotion:
+    """The tip after the reference jumps from `start` to `stop` [rad], linear about `stop`; see `free_motion`."""
+    poles, into, out = _modal(arm, controller, stop)
+    joints = stop.shape[0]
+    return FreeMotion(poles, out * (-into[:, :joints] @ (start - stop).astype(into.dtype) / poles))
+
+
+def _modal(
+    arm: Arm, controller: AbstractController, rest: Float[Array, " joints"]
+) -> tuple[Array, Array, Array]:
+    """Poles of the closed loop, what its inputs do to each mode, and what each does to the tip."""
+    loop = linearise(arm, rest, controller, ("tip_x", "tip_y"))
+    poles, vectors = jnp.linalg.eig(loop.A)
+    return poles, jnp.linalg.solve(vectors, loop.B.astype(vectors.dtype)), loop.C @ vectors
 
 
 def stack_motions(motions: Sequence[FreeMotion]) -> FreeMotion:

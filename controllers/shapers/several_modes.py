@@ -38,8 +38,9 @@ def simultaneous(frequencies: Modes, damping_ratios: Modes) -> Shaper:
     """Zero placement at the shortest spacing at which no amplitude is negative.
 
     For two modes below three times apart in frequency it is shorter than two ZV in series,
-    by up to a quarter; farther apart, no longer to within a hundredth. Without damping it
-    is then three impulses `1 / (f_1 + f_2)` apart, the fewest there can be (Hyde and
+    by up to a quarter; up to four times apart it is no longer to within a hundredth, and
+    beyond that one spacing does not suit both, and ZV in series are shorter. Without
+    damping and below three times it is three impulses `1 / (f_1 + f_2)` apart, the fewest there can be (Hyde and
     Seering 1991; Pao 1999), with impulses of zero between; for one mode it is ZV.
     Spacings up to the longest period are looked at; if none will do, the one with the
     smallest negative amplitude is taken.

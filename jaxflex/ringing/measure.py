@@ -110,6 +110,8 @@ def _worth(fit: Fit) -> np.ndarray:
     """Which modes to keep: large enough, known well enough, ringing, and the `MODES` largest."""
     sizes = np.where(fit.damping_ratio < RINGS, fit.size, 0.0)
     sizes = np.where(fit.frequency_std < 0.1 * fit.frequency, sizes, 0.0)
+    unsure = fit.damping_std > 0.5 * np.maximum(fit.damping_ratio, 0.0)
+    sizes = np.where(unsure & (sizes < sizes.max()), 0.0, sizes)
     width = fit.damping_ratio * fit.frequency
     for i in np.argsort(-sizes):
         # a vibration that changes as it dies looks like several at one frequency
@@ -143,7 +145,8 @@ def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
         )
     if fit.damping_std[first] > 0.3 * max(fit.damping_ratio[first], 1e-3):
         said.append(
-            f"{source}: the damping ratio {fit.damping_ratio[first]:.3g} is known to +-{fit.damping_std[first]:.2g} only."
+            f"{source}: the damping ratio {fit.damping_ratio[first]:.3g} is known to "
+            f"+-{fit.damping_std[first]:.2g} only; record a longer or stronger vibration."
         )
     if fit.damping_ratio[first] < 0:
         said.append(
@@ -220,7 +223,7 @@ def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
         )  # fmt: skip
         if np.ptp(f) > 4 * np.max(df) and np.ptp(f) > 0.01 * mean_f:
             said.append(
-                f"the recordings put this mode from {f.min():.4g} to {f.max():.4g} Hz, more than their noise "
+                f"the recordings put one mode from {f.min():.4g} to {f.max():.4g} Hz, more than their noise "
                 "explains: a change of payload, pose or amplitude. The spread holds them all."
             )
     return modes, said

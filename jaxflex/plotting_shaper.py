@@ -1,0 +1,68 @@
+"""The picture of `jaxflex shaper`: what rings, and what each shaper leaves of it."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .plotting import AFTER, panels, strongest_peaks
+
+LABELS = 4  # peaks that are written on
+
+
+def plot_shapers(
+    frequencies: np.ndarray,
+    spectrum: np.ndarray,
+    bands: Sequence[tuple[float, float]],
+    curves: Mapping[str, np.ndarray],
+    recommended: str,
+) -> Figure:
+    """Spectrum over frequency [Hz], the spread of each mode, and the share that every shaper leaves.
+
+    `spectrum` in any unit, drawn as a share of its highest; `curves`: name of a shaper to
+    its residual at `frequencies`.
+    """
+    figure, axes = panels(1, 1, height=4.6)
+    axis = axes[0, 0]
+    share = spectrum / spectrum.max()
+    axis.fill_between(frequencies, 0, share, color="0.82", label="spectrum (left scale)", zorder=1)
+    axis.plot(frequencies, share, color="0.55", linewidth=0.8, zorder=1)
+    for i, (low, high) in enumerate(bands):
+        wide = max(high - low, 2e-3 * frequencies[-1])
+        middle = (low + high) / 2
+        axis.axvspan(
+            middle - wide / 2, middle + wide / 2, color="#d09a2a", alpha=0.25, linewidth=0,
+            label="spread of the modes" if i == 0 else None, zorder=0,
+        )  # fmt: skip
+    for peak in strongest_peaks(frequencies, share + 1e-12, LABELS):
+        if share[peak] > 0.01:
+            axis.annotate(
+                f"{frequencies[peak]:.3g} Hz", (frequencies[peak], share[peak]), xytext=(5, 2),
+                textcoords="offset points", fontsize=9, weight="bold", color="0.25", zorder=6,
+            )  # fmt: skip
+    axis.set_xlabel("frequency [Hz]")
+    axis.set_ylabel("spectrum, share of its highest [1]")
+    axis.set_xlim(0, frequencies[-1])
+    axis.set_ylim(0, 1.12)
+    other = axis.twinx()
+    other.spines[["top"]].set_visible(False)
+    for i, (name, curve) in enumerate(curves.items()):
+        best = name == recommended
+        other.plot(
+            frequencies, 100 * curve, label=f"{name} (recommended)" if best else name,
+            color=AFTER if best else f"C{i % 10}", linewidth=2.6 if best else 1.0,
+            linestyle="-" if best else ("--", "-.", ":")[i % 3], zorder=5 if best else 3,
+        )  # fmt: skip
+    other.set_ylim(0, 112)
+    other.set_ylabel("vibration left by the shaper [%]")
+    handles, labels = axis.get_legend_handles_labels()
+    more, names = other.get_legend_handles_labels()
+    axis.legend(
+        handles + more,
+        labels + names,
+        fontsize=8,
+        frameon=False,
+        loc="upper left",
+        bbox_to_anchor=(1.09, 1.0),
+    )
+    return figure
