@@ -37,6 +37,7 @@ from .minimise import minimise as minimise
 from .pd import GAINS as GAINS
 from .pd import PD as PD
 from .pd import OpenLoop as OpenLoop
+from .recommend import ALTERNATING as ALTERNATING
 from .recommend import Rated as Rated
 from .recommend import rate_shapers as rate_shapers
 from .recommend import recommend as recommend

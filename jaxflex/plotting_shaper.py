@@ -16,11 +16,12 @@ def plot_shapers(
     bands: Sequence[tuple[float, float]],
     curves: Mapping[str, np.ndarray],
     recommended: str,
+    coloured: Sequence[str],
 ) -> Figure:
     """Spectrum over frequency [Hz], the spread of each mode, and the share that every shaper leaves.
 
     `spectrum` in any unit, drawn as a share of its highest; `curves`: name of a shaper to
-    its residual at `frequencies`.
+    its residual at `frequencies`; those `coloured` stand out from the rest.
     """
     figure, axes = panels(1, 1, height=4.6)
     axis = axes[0, 0]
@@ -46,13 +47,19 @@ def plot_shapers(
     axis.set_ylim(0, 1.12)
     other = axis.twinx()
     other.spines[["top"]].set_visible(False)
-    for i, (name, curve) in enumerate(curves.items()):
-        best = name == recommended
+    plain = True
+    for name, curve in curves.items():
+        if name not in coloured and name != recommended:
+            label = "other shapers" if plain else None
+            other.plot(frequencies, 100 * curve, color="0.72", linewidth=0.6, label=label, zorder=2)
+            plain = False
+    for i, name in enumerate(n for n in curves if n in coloured and n != recommended):
         other.plot(
-            frequencies, 100 * curve, label=f"{name} (recommended)" if best else name,
-            color=AFTER if best else f"C{i % 10}", linewidth=2.6 if best else 1.0,
-            linestyle="-" if best else ("--", "-.", ":")[i % 3], zorder=5 if best else 3,
+            frequencies, 100 * curves[name], label=name, color=f"C{i + 1}", linewidth=1.3,
+            linestyle=("--", "-.", ":")[i % 3], zorder=3,
         )  # fmt: skip
+    best = f"{recommended} (recommended)"
+    other.plot(frequencies, 100 * curves[recommended], label=best, color=AFTER, linewidth=2.6, zorder=5)
     other.set_ylim(0, 112)
     other.set_ylabel("vibration left by the shaper [%]")
     handles, labels = axis.get_legend_handles_labels()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from controllers import Rated, rate_shapers, recommend, residual_curve
+from controllers import ALTERNATING, Rated, rate_shapers, recommend, residual_curve
 
 from ..files.read_recording import read_recording
 from ..plotting_shaper import plot_shapers
@@ -151,7 +151,17 @@ def _draw(found: Found, rated: Sequence[Rated], best: Rated):
     at = jnp.maximum(jnp.asarray(found.frequencies), 1e-9)
     curves = {each.name: np.asarray(residual_curve(each.shaper, at, zeta)) for each in rated}
     bands = [mode.frequency_range for mode in found.modes]
-    return plot_shapers(found.frequencies, found.spectrum, bands, curves, best.name)
+    return plot_shapers(found.frequencies, found.spectrum, bands, curves, best.name, _front(rated))
+
+
+def _front(rated: Sequence[Rated]) -> list[str]:
+    """Shapers of positive impulses that no shorter one betters, ZV first; the rest are drawn in grey."""
+    front, least = [], np.inf
+    for each in rated:
+        if each.name not in ALTERNATING and each.worst < least:
+            front.append(each.name)
+            least = each.worst
+    return front
 
 
 def snippet(found: Found, best: Rated) -> str:

@@ -16,6 +16,7 @@ from ..ringing.measure import RINGS, SMALL
 from .design_file import read_design
 from .runtime import UsageError
 
+FOLLOWED = 1.6  # ratio of frequencies at neighbouring payloads up to which a mode is the same
 BUILT_IN = tuple(np.linspace(0.0, 0.1, 6).tolist())  # kg
 
 
@@ -63,20 +64,25 @@ def _ringing(motion: FreeMotion) -> np.ndarray:
 
 def _followed(arm: Arm, by_payload: list[np.ndarray]) -> list[MeasuredMode]:
     """Modes followed from payload to payload by the nearest frequency, by falling size."""
-    if any(len(rows) == 0 for rows in by_payload):
+    chains: list[list[np.ndarray]] = []
+    for rows in by_payload:
+        left = list(range(len(rows)))
+        for chain in chains:
+            jumps = [abs(np.log(rows[i, 0] / chain[-1][0])) for i in left]
+            if jumps and min(jumps) < np.log(FOLLOWED):
+                chain.append(rows[left.pop(int(np.argmin(jumps)))])
+        chains += [[rows[i]] for i in left]
+    if not chains:
         raise UsageError(f"{arm.name}: no mode of the closed loop rings: a shaper has nothing to cancel.")
     modes = []
-    for start in by_payload[0]:
-        path = [start]
-        for rows in by_payload[1:]:
-            path.append(rows[np.argmin(np.abs(np.log(rows[:, 0] / path[-1][0])))])
-        f, z, size = np.array(path).T
+    for chain in chains:
+        f, z, size = np.array(chain).T
         z = np.maximum(z, 0.0)
         modes.append(
             MeasuredMode(
                 float((f.min() + f.max()) / 2), 0.0, float((z.min() + z.max()) / 2), 0.0,
                 (float(f.min()), float(f.max())), (float(z.min()), float(z.max())),
-                float(size.max()), len(by_payload),
+                float(size.max()), len(chain),
             )
         )  # fmt: skip
     modes.sort(key=lambda mode: -mode.size)

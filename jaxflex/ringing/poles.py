@@ -12,7 +12,7 @@ from .stretches import Stretch, spectrum_of
 
 FINE = 6.0  # samples per period of the highest peak at which the Hankel matrix is filled
 ORDER = 16  # poles, at most
-PEAK = 300.0  # times the median of the spectrum that a peak has to reach to count
+PEAK = 100.0  # times the median of the spectrum that a peak has to reach to count
 COLUMNS = 3000
 SHARE = 1e-3  # of the highest peak, below which another is not looked at
 
@@ -23,8 +23,8 @@ def first_poles(stretches: list[Stretch]) -> np.ndarray:
     if len(stretches[0].inputs):
         return np.concatenate([_driven(s, _heard(s)) for s in stretches])
     step = stretches[0].step
-    stride = max(1, int(1 / (FINE * top * step)))
     shortest = min(s.outputs.shape[1] for s in stretches)
+    stride = max(1, min(int(1 / (FINE * top * step)), shortest // (4 * ORDER)))
     rows = int(np.clip(2.0 / (low * stride * step), 2 * ORDER, 80))
     rows = max(2, min(rows, shortest // (2 * stride)))
     blocks = []
@@ -40,7 +40,7 @@ def highest_peak(stretches: list[Stretch]) -> tuple[float, float]:
     """Frequencies [Hz] of the highest and of the lowest peak that stand out of the noise."""
     tops, lows = [], []
     for stretch in stretches:
-        f, density = spectrum_of(stretch.outputs, stretch.step)
+        f, density = spectrum_of(stretch.outputs, stretch.step, falling=not len(stretch.inputs))
         inside = np.flatnonzero((density[1:-1] > density[:-2]) & (density[1:-1] >= density[2:])) + 1
         floor = max(PEAK * np.median(density), SHARE * density[1:].max())
         peaks = inside[density[inside] >= floor]
@@ -63,7 +63,7 @@ def _realise(hankel: np.ndarray, channels: int, step: float) -> np.ndarray:
     left, sizes, _ = np.linalg.svd(hankel, full_matrices=False)
     noise = 2.5 * np.median(sizes) if len(sizes) > 2 * ORDER else 0.0
     rank = int(np.clip(np.sum(sizes > max(noise, 1e-8 * sizes[0])), 2, ORDER))
-    basis = left[:, :rank]
+    basis = left[:, : min(rank, len(hankel) // 2)]
     shift = np.linalg.lstsq(basis[:-channels], basis[channels:], rcond=None)[0]
     values = np.linalg.eigvals(shift).astype(complex)
     poles = np.log(values[np.abs(values) > 1e-12]) / step

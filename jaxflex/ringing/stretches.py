@@ -112,11 +112,15 @@ def strongest(outputs: np.ndarray, step: float) -> float:
     return float(frequencies[1 + np.argmax(density[1:])])
 
 
-def spectrum_of(outputs: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies [Hz] and the mean power of all channels there, each channel in units of its deviation."""
+def spectrum_of(outputs: np.ndarray, step: float, falling: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies [Hz] and the mean power of all channels there, each channel in units of its deviation.
+
+    Through a Hann window, or the falling half of one, which keeps the beginning of a decay.
+    """
     centred = outputs - outputs.mean(axis=1, keepdims=True)
     scaled = centred / np.maximum(centred.std(axis=1, keepdims=True), 1e-300)
     count = outputs.shape[1]
+    window = np.hanning(2 * count)[count:] if falling else np.hanning(count)
     length = max(4096, 1 << (count - 1).bit_length())  # padded, so that peaks are not between the bins
-    power = np.abs(np.fft.rfft(scaled * np.hanning(count), length, axis=1)) ** 2
+    power = np.abs(np.fft.rfft(scaled * window, length, axis=1)) ** 2
     return np.fft.rfftfreq(length, step), power.mean(axis=0)
