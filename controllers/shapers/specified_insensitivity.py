@@ -12,12 +12,12 @@ Where the humps of the EI shaper so slowed would not all fit into the band, the 
 the shorter.
 """
 
-import equinox as eqx
+from functools import lru_cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jaxtyping import Array
+from scipy.optimize import root
 
 from jaxflex import ScalarLike, scalar
 
@@ -26,6 +26,7 @@ from .shaper import Shaper, decaying, mode
 from .zero_vibration import zv
 
 WIDEST = 0.9
+STEPS = 24  # in which a solution is followed
 
 
 def si(
@@ -62,48 +63,52 @@ def si(
         amplitudes = chebyshev_impulses(humps + 1, scalar(tolerance))
         offsets = stretch / 2 * jnp.arange(humps + 2.0)
     else:
-        amplitudes, offsets = _spread(humps, low, high, tolerance)
+        amplitudes, offsets = map(jnp.asarray, _spread(humps, float(insensitivity), float(tolerance)))
     return decaying(amplitudes, 2 * jnp.pi / damped * offsets, rate)
 
 
-@eqx.filter_jit
-def _spread(humps: int, low: float, high: float, tolerance: float) -> tuple[Array, Array]:
+@lru_cache
+def _spread(humps: int, width: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """Amplitudes and delays [periods] of `humps + 2` impulses at the tolerance at both edges and between.
 
     About the middle the residual is `c + sum_k a_k cos(w tau_k)`, of alternating sign at
-    the lower edge, at the tops and at the upper edge.
+    the lower edge, at the tops and at the upper edge. At some width the slowed EI shaper
+    is one of these; from there the solution is followed down to the width asked for.
     """
     count = humps + 2
     pairs, even = count // 2, count % 2 == 0
-    _, tops, edge = ripple(humps + 1, tolerance)
-    stretch = edge / low
-    spread = chebyshev_impulses(humps + 1, scalar(tolerance))[count - pairs :]
-    start = {
-        "pairs": 2 * (spread[:-1] if even else spread),
-        "offsets": stretch / 2 * (jnp.arange(count - pairs, count) - (count - 1) / 2),
-        "tops": tops[: humps - 1] / stretch,
-    }
+    with jax.ensure_compile_time_eval():
+        _, tops, edge = (np.asarray(part) for part in ripple(humps + 1, tolerance))
+        spread = np.asarray(chebyshev_impulses(humps + 1, scalar(tolerance)))[count - pairs :]
+    common = 2 * (tops[-1] - edge) / (tops[-1] + edge)
+    stretch = edge / (1 - common / 2)
+    offsets = stretch / 2 * (np.arange(count - pairs, count) - (count - 1) / 2)
+    signs = (-1.0) ** np.arange(humps + 1)
+    free = pairs - 1 if even else pairs
 
-    def share(x, ratio):
-        a, centre = x["pairs"], 1 - x["pairs"].sum()
-        if even:
-            a, centre = jnp.append(a, centre), 0.0
-        return centre + jnp.sum(a * jnp.cos(2 * jnp.pi * ratio * x["offsets"]))
+    def parts(x):
+        a, squares, inner = x[:free], x[free : free + pairs], x[free + pairs :]
+        rest = 1 - a.sum()
+        return (np.append(a, rest), 0.0, squares, inner) if even else (a, rest, squares, inner)
 
-    def equations(x, _):
-        where = jnp.concatenate([jnp.full(1, low), x["tops"], jnp.full(1, high)])
-        signs = (-1.0) ** jnp.arange(humps + 1)
-        heights = jax.vmap(lambda r: share(x, r))(where)
-        slopes = jax.vmap(jax.grad(share, argnums=1), (None, 0))(x, x["tops"])
-        return signs * heights / tolerance - 1, slopes
+    def equations(x, low, high):
+        a, centre, squares, inner = parts(x)
+        where = np.concatenate([[low], inner, [high]])
+        # the inner two impulses meet at the narrow end: their offset enters by its square
+        angles = 2 * np.pi * np.outer(where, np.sqrt(squares + 0j))
+        heights = centre + np.cos(angles).real @ a
+        slopes = (np.sin(angles[1:-1]) * np.sqrt(squares + 0j)).real @ a
+        return np.concatenate([signs * heights / tolerance - 1, slopes / tolerance])
 
-    x = optx.root_find(equations, optx.Newton(1e-12, 1e-12), start, throw=False, max_steps=60).value
-    halves, last = x["pairs"] / 2, 1 - x["pairs"].sum()
-    if even:
-        halves = jnp.append(halves, last / 2)
-        amplitudes = jnp.concatenate([halves[::-1], halves])
-        offsets = jnp.concatenate([-x["offsets"][::-1], x["offsets"]])
-    else:
-        amplitudes = jnp.concatenate([halves[::-1], last[None], halves])
-        offsets = jnp.concatenate([-x["offsets"][::-1], jnp.zeros(1), x["offsets"]])
-    return amplitudes, offsets - offsets[0]
+    x = np.concatenate([2 * spread[:free], offsets**2, tops[: humps - 1] / stretch])
+    for near in np.linspace(common, width, STEPS):
+        x = root(equations, x, (1 - near / 2, 1 + near / 2), tol=1e-13).x
+    error = np.abs(equations(x, 1 - width / 2, 1 + width / 2)).max()
+    a, centre, squares, _ = parts(x)
+    if not error < 1e-8 or squares.min() < 0:
+        raise ValueError(f"insensitivity = {width:g}: its equations were not solved; try a width next to it.")
+    halves, taus = a / 2, np.sqrt(squares)
+    middle = np.zeros(0) if even else np.array([centre])
+    amplitudes = np.concatenate([halves[::-1], middle, halves])
+    delays = np.concatenate([-taus[::-1], 0 * middle, taus]) + taus[-1]
+    return amplitudes, delays
