@@ -54,7 +54,8 @@ class Rated(NamedTuple):
 @eqx.filter_jit
 def _worst(shaper: Shaper, frequency: Float[Array, "2"], damping_ratio: Float[Array, "2"]) -> Array:
     """The largest residual over a rectangle of frequencies [Hz] and damping ratios."""
-    f, z = (jnp.linspace(*ends, count) for ends, count in zip((frequency, damping_ratio), GRID, strict=True))
+    f = jnp.linspace(frequency[0], frequency[1], GRID[0])
+    z = jnp.linspace(damping_ratio[0], damping_ratio[1], GRID[1])
     return jax.vmap(lambda a: jax.vmap(lambda b: residual_ratio(shaper, a, b))(z))(f).max()
 
 

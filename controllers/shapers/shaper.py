@@ -5,9 +5,9 @@ analytically, so that the result is smooth in the times t_i.
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from jaxflex import AbstractReference, Scalar, ScalarLike, scalar
@@ -79,7 +79,7 @@ def convolve(first: Shaper, second: Shaper) -> Shaper:
 
 def known(value: Scalar) -> bool:
     """True of a value that is there to look at, not traced by `jit` or `grad`."""
-    return not isinstance(value, jax.core.Tracer)
+    return not isinstance(value, Tracer)
 
 
 def mode(frequency: ScalarLike, damping_ratio: ScalarLike) -> tuple[Scalar, Scalar]:

@@ -44,7 +44,7 @@ def polynomial(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0, order: in
     low, high = order + 1.0, order + 1.0
     while spherical_jn(order, low) * spherical_jn(order, high) > 0:
         high += 0.5
-    zero = brentq(lambda x: spherical_jn(order, x), low, high, xtol=1e-14)
+    zero = float(brentq(lambda x: spherical_jn(order, x), low, high, xtol=1e-14))  # pyright: ignore
     return _kernel(lambda x: (x * (1 - x)) ** order, zero / np.pi, frequency, damping_ratio)
 
 

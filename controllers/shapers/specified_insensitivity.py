@@ -96,8 +96,8 @@ def _spread(humps: int, width: float, tolerance: float) -> tuple[np.ndarray, np.
         where = np.concatenate([[low], inner, [high]])
         # the inner two impulses meet at the narrow end: their offset enters by its square
         angles = 2 * np.pi * np.outer(where, np.sqrt(squares + 0j))
-        heights = centre + np.cos(angles).real @ a
-        slopes = (np.sin(angles[1:-1]) * np.sqrt(squares + 0j)).real @ a
+        heights = centre + np.real(np.cos(angles)) @ a
+        slopes = np.real(np.sin(angles[1:-1]) * np.sqrt(squares + 0j)) @ a
         return np.concatenate([signs * heights / tolerance - 1, slopes / tolerance])
 
     x = np.concatenate([2 * spread[:free], offsets**2, tops[: humps - 1] / stretch])

@@ -121,7 +121,7 @@ def shaper_table(found: Found, rated: Sequence[Rated], best: Rated) -> Table:
 
 def calls_table(rated: Sequence[Rated], best: Rated) -> Table:
     """The line of Python that makes each shaper."""
-    rows = [[each.name, each.call] for each in rated]
+    rows: list[Sequence[str]] = [(each.name, each.call) for each in rated]
     return Table("In Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2)
 
 

@@ -56,8 +56,8 @@ def _ringing(motion: FreeMotion) -> np.ndarray:
     poles = np.asarray(motion.poles)
     size = np.linalg.norm(np.asarray(motion.tip), axis=0)
     share = size / size.sum()
-    zeta = -poles.real / np.abs(poles)
-    kept = (poles.imag > 0) & (zeta < RINGS)
+    zeta = -np.real(poles) / np.abs(poles)
+    kept = (np.imag(poles) > 0) & (zeta < RINGS)
     rows = np.column_stack([np.abs(poles) / (2 * np.pi), zeta, 2 * share])[kept]
     return rows[np.argsort(rows[:, 0])]
 
@@ -92,6 +92,6 @@ def _followed(arm: Arm, by_payload: list[np.ndarray]) -> list[MeasuredMode]:
 def _spectrum(motion: FreeMotion, frequencies: np.ndarray) -> np.ndarray:
     """Size of the Fourier transform of the ringing part of the tip's motion."""
     poles, tip = np.asarray(motion.poles), np.asarray(motion.tip)
-    rings = (np.abs(poles.imag) > 0) & (-poles.real < RINGS * np.abs(poles))
+    rings = (np.abs(np.imag(poles)) > 0) & (-np.real(poles) < RINGS * np.abs(poles))
     s = 2j * np.pi * frequencies[:, None]
     return np.linalg.norm((1 / (s - poles[rings])) @ tip[:, rings].T, axis=1)

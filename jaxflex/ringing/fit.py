@@ -61,7 +61,7 @@ def columns(stretch: Stretch, poles: np.ndarray) -> np.ndarray:
             waves.append(lfilter([1.0], [1.0, -turn], held))
         for wave in waves:
             parts.append(wave.real)
-            if pole.imag:
+            if np.imag(pole):
                 parts.append(wave.imag)
     return np.stack(parts, axis=1)
 

@@ -74,12 +74,11 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
     poles = first_poles(found)
     nyquist = np.pi / found[0].step
     longest = max(s.times[-1] for s in found)
-    damping = -poles.real / np.maximum(np.abs(poles), 1e-300)
-    rings = (poles.imag > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < 0.95 * nyquist)
+    damping = -np.real(poles) / np.maximum(np.abs(poles), 1e-300)
+    rings = (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < 0.95 * nyquist)
     rings &= np.abs(poles) * longest > 2 * np.pi  # a full turn within the data
-    real = poles[
-        (np.abs(poles.imag) < 1e-9) & (poles.real < -0.5 / longest) & (poles.real > -nyquist / 3)
-    ].real
+    alone = (np.abs(np.imag(poles)) < 1e-9) & (np.real(poles) < -0.5 / longest)
+    real = np.real(poles)[alone & (np.real(poles) > -nyquist / 3)]
     slow = real[np.argsort(-real)][:2] if len(found[0].inputs) else real[:0]
     candidates = poles[rings]
     if not len(candidates):

@@ -67,7 +67,7 @@ def _realise(hankel: np.ndarray, channels: int, step: float) -> np.ndarray:
     shift = np.linalg.lstsq(basis[:-channels], basis[channels:], rcond=None)[0]
     values = np.linalg.eigvals(shift).astype(complex)
     poles = np.log(values[np.abs(values) > 1e-12]) / step
-    return poles[poles.imag >= 0]
+    return poles[np.imag(poles) >= 0]
 
 
 def _driven(stretch: Stretch, top: float) -> np.ndarray:
