@@ -88,9 +88,7 @@ def _from_recordings(paths: Sequence[Path]) -> Found:
 
 def mode_table(found: Found) -> Table:
     """One row a mode."""
-    table = Table(
-        "What rings", ["mode", "frequency [Hz]", "spread [Hz]", "damping ratio", "spread", "share of motion"]
-    )
+    table = Table("What rings", ["mode", "frequency [Hz]", "spread [Hz]", "damping ratio", "spread", "share"])
     for i, mode in enumerate(found.modes, 1):
         table.rows.append(
             [

@@ -24,8 +24,8 @@ def modes_of_arm(path: Path | None, payloads: Sequence[float] | None, count: int
     """Title, modes by size with their spread over payloads, `count` frequencies [Hz], spectrum, words.
 
     Of the loop closed by the design in the file, or by the textbook PD for the middle
-    payload, about the end of its move. The size of a mode is its share of the tip's
-    motion after a step of the reference.
+    payload, about the end of its move. The size of a mode is its share of all
+    ringing of the tip after a step of the reference.
     """
     file = read_arm_file(path) if path else None
     arm = file.arm if file else ahmad_arm()
@@ -55,10 +55,10 @@ def _ringing(motion: FreeMotion) -> np.ndarray:
     """Frequency [Hz], damping ratio and size of every mode that rings, by frequency."""
     poles = np.asarray(motion.poles)
     size = np.linalg.norm(np.asarray(motion.tip), axis=0)
-    share = size / size.sum()
     zeta = -np.real(poles) / np.abs(poles)
     kept = (np.imag(poles) > 0) & (zeta < RINGS)
-    rows = np.column_stack([np.abs(poles) / (2 * np.pi), zeta, 2 * share])[kept]
+    share = size / max(size[kept].sum(), 1e-300)
+    rows = np.column_stack([np.abs(poles) / (2 * np.pi), zeta, share])[kept]
     return rows[np.argsort(rows[:, 0])]
 
 
