@@ -164,10 +164,13 @@ def _tuned(motions, length, times, impulses, starts, max_steps, seed) -> TunedSh
         inside = -jnp.sum(jnp.log(made.amplitudes)) - jnp.sum(jnp.log(gaps))
         return jax.nn.logsumexp(power * boxes) / power * scale / reference + INSIDE / power * inside
 
+    def at_power(free, power):
+        solver = optx.BFGS(rtol=1e-9, atol=1e-9)
+        found = optx.minimise(cost, solver, free, args=power, max_steps=max_steps, throw=False)
+        return found.value, None
+
     def descend(free):
-        for power in POWERS:
-            solver = optx.BFGS(rtol=1e-9, atol=1e-9)
-            free = optx.minimise(cost, solver, free, args=power, max_steps=max_steps, throw=False).value
+        free = jax.lax.scan(at_power, free, jnp.asarray(POWERS))[0]
         return free, worst(free)
 
     reference = jax.lax.stop_gradient(worst(first))

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.signal import find_peaks
 
-from .plotting import AFTER, panels, strongest_peaks
+from .plotting import AFTER, panels
 
 LABELS = 4  # peaks that are written on
 
@@ -35,12 +36,13 @@ def plot_shapers(
             middle - wide / 2, middle + wide / 2, color="#d09a2a", alpha=0.25, linewidth=0,
             label="spread of the modes" if i == 0 else None, zorder=0,
         )  # fmt: skip
-    for peak in strongest_peaks(frequencies, share + 1e-12, LABELS):
-        if share[peak] > 0.01:
-            axis.annotate(
-                f"{frequencies[peak]:.3g} Hz", (frequencies[peak], share[peak]), xytext=(5, 2),
-                textcoords="offset points", fontsize=9, weight="bold", color="0.25", zorder=6,
-            )  # fmt: skip
+    apart = len(frequencies) // 25  # closer ones could not be labelled side by side
+    peaks = find_peaks(share, prominence=0.03, distance=apart)[0]
+    for peak in peaks[np.argsort(-share[peaks])][:LABELS]:
+        axis.annotate(
+            f"{frequencies[peak]:.3g} Hz", (frequencies[peak], share[peak]), xytext=(0, 4), ha="center",
+            textcoords="offset points", fontsize=9, weight="bold", color="0.25", zorder=6,
+        )  # fmt: skip
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel("spectrum, share of its highest [1]")
     axis.set_xlim(0, frequencies[-1])

@@ -11,7 +11,7 @@ from ..pictures import MEASURED, OURS, figure
 
 def draw_impulses(shown: dict) -> Figure:
     """Impulses of both over time."""
-    made, axes = figure(2, 2, height=2.8)
+    made, axes = figure(len(shown) // 2, 2, height=2.8)
     for axis, (name, (_, _, duration, _, best, shaper)) in zip(axes.flat, shown.items(), strict=True):
         delays, amplitudes = np.array(best.impulses()).T
         for times, sizes, colour, marker, label in (

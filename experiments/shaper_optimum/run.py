@@ -44,6 +44,8 @@ def run(folder: Path, reduced: bool) -> dict:
         "two-link arm": (links, heavy, None),
         "two-link arm, stiff joints": (links, heavy, STIFF),
     }
+    if reduced:
+        cases = {name: cases[name] for name in ("single link", "two-link arm, stiff joints")}
     figures: dict = {}
     shown = {}
     for name, (arm, payloads, bandwidth) in cases.items():
@@ -59,7 +61,7 @@ def run(folder: Path, reduced: bool) -> dict:
                 duration,
                 times,
                 IMPULSES,
-                starts=2 if reduced else 8,
+                starts=1 if reduced else 8,
                 max_steps=100 if reduced else 200,
             )
             if length == LENGTHS[3]:

@@ -121,6 +121,6 @@ def spectrum_of(outputs: np.ndarray, step: float, falling: bool = False) -> tupl
     scaled = centred / np.maximum(centred.std(axis=1, keepdims=True), 1e-300)
     count = outputs.shape[1]
     window = np.hanning(2 * count)[count:] if falling else np.hanning(count)
-    length = max(4096, 1 << (count - 1).bit_length())  # padded, so that peaks are not between the bins
+    length = 1 << (8 * count - 1).bit_length()  # padded, so that peaks are not between the bins
     power = np.abs(np.fft.rfft(scaled * window, length, axis=1)) ** 2
     return np.fft.rfftfreq(length, step), power.mean(axis=0)

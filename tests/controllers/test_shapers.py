@@ -34,7 +34,7 @@ LEAVES_TOLERANCE = {"EI": 0.05, "EI, 3 humps": 0.05}  # at the mode itself; all 
 made = jax.jit(lambda name, f, z: SHAPERS[name](f, z), static_argnums=0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.floats(0.2, 30.0), st.floats(0.0, 0.3))
 @pytest.mark.parametrize("name", list(SHAPERS))
 def test_shapers_cancel_their_mode_and_cover_the_distance(name, frequency, zeta):
@@ -148,7 +148,7 @@ def test_specified_insensitivity_holds_its_tolerance(width):
             np.testing.assert_allclose(worst, 0.05, rtol=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.5, 2.0), st.floats(1.05, 4.0), st.floats(0.0, 0.1), st.floats(0.0, 0.1))
 def test_two_modes_are_cancelled_together(first, ratio, zeta_1, zeta_2):
     f, zeta = jnp.array([first, first * ratio]), jnp.array([zeta_1, zeta_2])
@@ -173,7 +173,7 @@ def test_simultaneous_design_of_undamped_modes_in_closed_form():
     assert zero_placement(jnp.ones(1), jnp.zeros(1), 0.25).amplitudes[1] < 1e-12
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.003, 0.02), st.floats(0.0, 0.1))
 def test_sampled_shapers_cancel_on_their_samples(sample_time, zeta):
     f, zetas = jnp.array([2.0, 5.0]), jnp.array([zeta, 0.02])
