@@ -100,5 +100,7 @@ def press(search: Search, run: Run, joint: int, gap: float) -> None:
     model = search.parameters.arm.assemble()
     first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
     link = model.links[joint]
-    curvature = run.starts[:, first : first + link.shapes] @ np.array([float(c) for c in link.gauge_curvature])
+    curvature = run.starts[:, first : first + link.shapes] @ np.array(
+        [float(c) for c in link.gauge_curvature]
+    )
     run.starts[:, first + link.shapes - 1] = np.sign(curvature) * gap / 2

@@ -53,7 +53,8 @@ def highest_peak(stretches: list[Stretch]) -> tuple[float, float]:
 def _heard(stretch: Stretch) -> float:
     """Highest frequency [Hz] at which a driven run is heard over the noise; its peaks may be the input's."""
     f, density = spectrum_of(stretch.outputs, stretch.step)
-    smooth = np.convolve(density, np.full(9, 1 / 9), mode="same")
+    cells = 8 * (2 * len(f)) // stretch.outputs.shape[1]  # padding makes neighbours alike
+    smooth = np.convolve(density, np.full(cells, 1 / cells), mode="same")
     heard = np.flatnonzero(smooth > 10 * np.median(smooth[len(smooth) // 2 :]))
     return float(f[heard[-1]]) if len(heard) else float(f[1 + np.argmax(density[1:])])
 
