@@ -69,6 +69,9 @@ from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
+from .ringing import MeasuredMode as MeasuredMode
+from .ringing import MeasuredModes as MeasuredModes
+from .ringing import measure_modes as measure_modes
 from .scalars import Scalar as Scalar
 from .scalars import ScalarLike as ScalarLike
 from .scalars import scalar as scalar

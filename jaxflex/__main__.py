@@ -8,6 +8,7 @@ import typer
 from .cli.diagnose import diagnose as diagnose_command
 from .cli.modes import modes as modes_command
 from .cli.runtime import command
+from .cli.shaper import shaper as shaper_command
 from .cli.simulate import simulate as simulate_command
 from .cli.tune import tune as tune_command
 
@@ -77,6 +78,24 @@ def diagnose(
 ) -> None:
     """Find where the model and measured runs disagree, name the missing effect, and add it."""
     command(diagnose_command)(arm, runs, json, output)
+
+
+@app.command()
+def shaper(
+    files: Annotated[
+        Optional[list[Path]],
+        typer.Argument(
+            metavar="[ARM | RUN...]",
+            help="arm.toml, or recordings of its vibration (CSV); without either, the built-in two-link arm.",
+        ),
+    ] = None,
+    payloads: Annotated[Optional[str], typer.Option(help="kg, FIRST:LAST:COUNT or A,B,…; of an arm.")] = None,
+    tolerance: Annotated[float, typer.Option(help="Share of the vibration that may be left.")] = 0.05,
+    json: Json = None,
+    output: Output = None,
+) -> None:
+    """Measure or compute what rings, and recommend an input shaper, with the reason."""
+    command(shaper_command)(files or [], payloads, tolerance, json, output)
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ FLOORS = [
     ["jaxflex.sensors", "jaxflex.drive", "jaxflex.control"],
     ["jaxflex.simulation"],
     ["jaxflex.analysis", "jaxflex.files", "jaxflex.plotting"],
-    ["jaxflex.diagnosis"],
+    ["jaxflex.diagnosis", "jaxflex.ringing"],
     ["jaxflex"],
     ["controllers"],
     ["jaxflex.cli"],

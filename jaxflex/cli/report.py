@@ -31,6 +31,7 @@ figure p, .note { color: var(--soft); font-size: .9rem; margin: .4rem 0; }
 .card > :first-child { font-size: 1.25rem; font-weight: 600; line-height: 1.35; margin-top: 0; }
 .card > :last-child { margin-bottom: 0; }
 .scroll { overflow-x: auto; }
+pre { background: var(--card); border-radius: 6px; padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .88rem; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap;
          vertical-align: top; }

@@ -124,5 +124,5 @@ def test_motor_axes_have_modes_and_simulate(tmp_path):
 
 
 def test_help():
-    for command in ("tune", "simulate", "modes", "diagnose"):
+    for command in ("tune", "simulate", "modes", "diagnose", "shaper"):
         assert run(command, "--help").exit_code == 0

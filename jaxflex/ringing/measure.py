@@ -1,0 +1,242 @@
+"""Modes of vibration from recordings, how sure they are, and what is wrong with the data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..files.recording import Recording, RecordingError
+from .fit import Fit, fit_modes, poles_of, sizes_of
+from .poles import first_poles
+from .stretches import Stretch, stretches
+
+MODES = 4  # of a recording, at most
+SMALL = 0.02  # share of the motion below which a mode is left out
+RINGS = 0.6  # damping ratio above which nothing rings
+SIGMAS = 2.0  # standard deviations that a spread reaches to either side
+HEARD = 0.1  # share of the variance that the modes have to explain
+SAME = 0.25  # relative difference in frequency within which modes of two recordings are the same
+
+
+@dataclass(frozen=True)
+class MeasuredMode:
+    """One mode: the mean over the recordings, its standard deviation, and the spread.
+
+    `frequency` [Hz] is the undamped one; `frequency_range`, `damping_range` hold every
+    recording's estimate with two standard deviations to either side; `size` is the
+    largest excursion of the mode as a share of all motion of its channel.
+    """
+
+    frequency: float
+    frequency_std: float
+    damping_ratio: float
+    damping_std: float
+    frequency_range: tuple[float, float]
+    damping_range: tuple[float, float]
+    size: float
+    recordings: int
+
+
+@dataclass(frozen=True)
+class MeasuredModes:
+    """`modes` by falling size, `warnings` in sentences, and what was used of each recording."""
+
+    modes: tuple[MeasuredMode, ...]
+    warnings: tuple[str, ...]
+    used: tuple[str, ...]
+    stretches: tuple[Stretch, ...]
+
+
+def measure_modes(recordings: Sequence[Recording]) -> MeasuredModes:
+    """Frequencies and damping ratios of all modes that ring in `recordings`.
+
+    Strain, tip deflection and tip acceleration are looked at; all such channels of a
+    recording share their modes. Free decays are fitted as such, runs that are driven
+    throughout together with their input; see `stretches`.
+
+    **Raises** `RecordingError` where a recording shows no vibration.
+    """
+    fits, parts, warnings, used = [], [], [], []
+    for recording in recordings:
+        warnings += [f"{recording.source}: {repair}" for repair in recording.repairs]
+        found = stretches(recording)
+        fit = _modes_of(found, recording.source)
+        fits.append(fit)
+        parts += found
+        warnings += _doubts(found, fit, recording.source)
+        used.append(_said(found, recording.source))
+    modes, apart = _gathered(fits)
+    return MeasuredModes(tuple(modes), tuple(warnings + apart), tuple(used), tuple(parts))
+
+
+def _modes_of(found: list[Stretch], source: str) -> Fit:
+    """The modes of one recording: candidates by realisation, the small ones dropped, the rest fitted."""
+    poles = first_poles(found)
+    nyquist = np.pi / found[0].step
+    longest = max(s.times[-1] for s in found)
+    damping = -np.real(poles) / np.maximum(np.abs(poles), 1e-300)
+    rings = (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < 0.95 * nyquist)
+    rings &= np.abs(poles) * longest > 2 * np.pi  # a full turn within the data
+    alone = (np.abs(np.imag(poles)) < 1e-9) & (np.real(poles) < -0.5 / longest)
+    real = np.real(poles)[alone & (np.real(poles) > -nyquist / 3)]
+    slow = real[np.argsort(-real)][:2] if len(found[0].inputs) else real[:0]
+    candidates = poles[rings]
+    if not len(candidates):
+        raise RecordingError(
+            f"{source}: nothing rings: no mode with a damping ratio below {RINGS:g} was found; record a "
+            "longer decay, or excite the arm more."
+        )
+    start = np.column_stack([np.abs(candidates) / (2 * np.pi), np.clip(damping[rings], 1e-4, 0.9)])
+    likely = np.argsort(-sizes_of(found, poles_of(start.ravel()), slow))[: MODES + 2]
+    fit = fit_modes(found, start[likely].ravel(), slow)
+    for _ in range(2 * MODES):
+        keep = _worth(fit)
+        if keep.all():
+            break
+        if not keep.any():
+            raise RecordingError(f"{source}: nothing rings above the noise; excite the arm more.")
+        kept = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)])[keep]
+        fit = fit_modes(found, kept.ravel(), slow)
+    if fit.explained < HEARD:
+        raise RecordingError(
+            f"{source}: nothing rings above the noise: modes explain {100 * fit.explained:.0f} % of the "
+            f"motion, at least {100 * HEARD:.0f} % are needed; excite the arm more."
+        )
+    return fit
+
+
+def _worth(fit: Fit) -> np.ndarray:
+    """Which modes to keep: large enough, known well enough, ringing, and the `MODES` largest."""
+    sizes = np.where(fit.damping_ratio < RINGS, fit.size, 0.0)
+    sizes = np.where(fit.frequency_std < 0.1 * fit.frequency, sizes, 0.0)
+    unsure = fit.damping_std > 0.5 * np.maximum(fit.damping_ratio, 0.0)
+    sizes = np.where(unsure & (sizes < sizes.max()), 0.0, sizes)
+    width = fit.damping_ratio * fit.frequency
+    for i in np.argsort(-sizes):
+        # a vibration that changes as it dies looks like several at one frequency
+        close = np.abs(fit.frequency - fit.frequency[i]) < 2 * np.abs(width + width[i])
+        sizes = np.where(close & (sizes < sizes[i]), 0.0, sizes)
+    keep = sizes >= max(SMALL, np.sort(sizes)[-MODES] if len(sizes) > MODES else 0.0)
+    if keep.all() or not keep.any():
+        return keep
+    # one at a time: others may change once it is gone
+    worst = np.argmin(np.where(keep, np.inf, sizes))
+    return np.arange(len(sizes)) != worst
+
+
+def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
+    """What to think twice about: few cycles, slow sampling, noise, and damping that changes with size."""
+    said = []
+    first = int(np.argmax(fit.size))
+    f = fit.frequency[first]
+    cycles = f * max(s.times[-1] for s in found)
+    if cycles < 5:
+        said.append(
+            f"{source}: only {cycles:.1f} cycles at {f:.3g} Hz; record at least five for its damping."
+        )
+    per_cycle = 1 / (f * found[0].step)
+    if per_cycle < 8:
+        said.append(f"{source}: only {per_cycle:.1f} samples a cycle at {f:.3g} Hz; sample faster.")
+    if fit.explained < 0.9:
+        said.append(
+            f"{source}: {100 * fit.explained:.0f} % of the motion is that of its modes; the rest is noise, "
+            "friction or another disturbance."
+        )
+    if fit.damping_std[first] > 0.3 * max(fit.damping_ratio[first], 1e-3):
+        said.append(
+            f"{source}: the damping ratio {fit.damping_ratio[first]:.3g} is known to "
+            f"+-{fit.damping_std[first]:.2g} only; record a longer or stronger vibration."
+        )
+    if fit.damping_ratio[first] < 0:
+        said.append(
+            f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
+        )
+    return said + _changes(found, fit, source, first)
+
+
+def _changes(found: list[Stretch], fit: Fit, source: str, first: int) -> list[str]:
+    """A word where frequency or damping of the largest mode differs between early and late in the decays."""
+    f, zeta = fit.frequency[first], max(fit.damping_ratio[first], 1e-3)
+    if len(found[0].inputs):
+        return []
+    early, late = [], []
+    for stretch in found:
+        # each half is as long as the vibration takes to fall to a third, but three cycles at least
+        half = int(max(1.1 / (2 * np.pi * f * zeta), 3 / f) / stretch.step)
+        half = min(half, stretch.outputs.shape[1] // 2)
+        if half * stretch.step * f < 2:
+            return []
+        for parts, start in ((early, 0), (late, half)):
+            window = stretch.outputs[:, start : start + half]
+            parts.append(Stretch(stretch.step, window, stretch.inputs[:, :half], stretch.channels, source))
+    start = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)]).ravel()
+    before, after = (fit_modes(parts, start, np.zeros(0)) for parts in (early, late))
+    said = []
+    for name, a, b, da, db, share in (
+        ("damping ratio", before.damping_ratio[first], after.damping_ratio[first],
+         before.damping_std[first], after.damping_std[first], 0.2),
+        ("frequency", before.frequency[first], after.frequency[first],
+         before.frequency_std[first], after.frequency_std[first], 0.01),
+    ):  # fmt: skip
+        if abs(b - a) > 4 * np.hypot(da, db) and abs(b - a) > share * max(abs(a), abs(b)):
+            cause = (
+                "friction" if name == "damping ratio" and b > a else "a stiffness or drag that is not linear"
+            )
+            said.append(
+                f"{source}: the {name} at {f:.3g} Hz changes with amplitude, from {a:.3g} early to {b:.3g} late "
+                f"in the decay: {cause}. Both count in the spread only if recorded at both sizes."
+            )
+    return said
+
+
+def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
+    """The modes of all recordings, those of like frequency as one, by falling size."""
+    groups: list[list[tuple[Fit, int]]] = []
+    order = sorted(
+        ((fit, k) for fit in fits for k in range(len(fit.frequency))), key=lambda p: -p[0].size[p[1]]
+    )
+    for fit, k in order:
+        for group in groups:
+            other, j = group[0]
+            near = abs(fit.frequency[k] / other.frequency[j] - 1) < SAME
+            if near and all(member is not fit for member, _ in group):
+                group.append((fit, k))
+                break
+        else:
+            groups.append([(fit, k)])
+    modes, said = [], []
+    for group in groups:
+        f = np.array([fit.frequency[k] for fit, k in group])
+        z = np.array([fit.damping_ratio[k] for fit, k in group])
+        df = np.array([fit.frequency_std[k] for fit, k in group])
+        dz = np.array([fit.damping_std[k] for fit, k in group])
+        mean_f, std_f = _mean(f, df)
+        mean_z, std_z = _mean(z, dz)
+        modes.append(
+            MeasuredMode(
+                mean_f, std_f, max(mean_z, 0.0), std_z,
+                (float(np.min(f - SIGMAS * df)), float(np.max(f + SIGMAS * df))),
+                (float(max(np.min(z - SIGMAS * dz), 0.0)), float(max(np.max(z + SIGMAS * dz), 0.0))),
+                float(max(fit.size[k] for fit, k in group)), len(group),
+            )
+        )  # fmt: skip
+        if np.ptp(f) > 4 * np.max(df) and np.ptp(f) > 0.01 * mean_f:
+            said.append(
+                f"the recordings put one mode from {f.min():.4g} to {f.max():.4g} Hz, more than their noise "
+                "explains: a change of payload, pose or amplitude. The spread holds them all."
+            )
+    return modes, said
+
+
+def _mean(values: np.ndarray, stds: np.ndarray) -> tuple[float, float]:
+    """The middle of the range of estimates, and the larger of its scatter and its stated deviation."""
+    scatter = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return float((values.min() + values.max()) / 2), max(scatter, float(np.max(stds)))
+
+
+def _said(found: list[Stretch], source: str) -> str:
+    channels = ", ".join(found[0].channels)
+    seconds = sum(s.times[-1] for s in found)
+    if len(found[0].inputs):
+        return f"{source}: {channels} over {seconds:.3g} s, driven throughout: fitted together with the input"
+    return f"{source}: {channels} in {len(found)} free decay(s), {seconds:.3g} s in all"
