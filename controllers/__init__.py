@@ -2,6 +2,13 @@
 
 # What the joints should do
 # How a design fares, and how it is tuned
+from .aggregate import AbstractAggregate as AbstractAggregate
+from .aggregate import Blend as Blend
+from .aggregate import ConditionalValueAtRisk as ConditionalValueAtRisk
+from .aggregate import Mean as Mean
+from .aggregate import Worst as Worst
+from .aggregate import likely as likely
+from .aggregate import varied as varied
 from .assess import Assessment as Assessment
 from .assess import assess as assess
 from .assess import measure as measure
@@ -13,8 +20,16 @@ from .bijections import Interval as Interval
 from .bijections import Positive as Positive
 from .bijections import Simplex as Simplex
 
+# Feedback
+from .biquad import Biquad as Biquad
+from .biquad import notch as notch
+from .compose import Filtered as Filtered
+from .compose import Sum as Sum
+from .compose import ZeroOrderHold as ZeroOrderHold
+
 # Designs to compare
 from .designs import Design as Design
+from .designs import NoRinging as NoRinging
 from .designs import classical_designs as classical_designs
 from .designs import default_move as default_move
 from .designs import ringing_mode as ringing_mode
@@ -22,13 +37,28 @@ from .designs import stack as stack
 from .designs import textbook_pd as textbook_pd
 from .designs import unshaped_design as unshaped_design
 from .designs import with_duration as with_duration
+from .instruments import Instrumented as Instrumented
+from .inverse_dynamics import ComputedTorque as ComputedTorque
+from .inverse_dynamics import InverseDynamics as InverseDynamics
+from .learning import Learned as Learned
+from .learning import Replayed as Replayed
+from .learning import impulse_response as impulse_response
+from .learning import learn as learn
+from .learning import learning_gain as learning_gain
+from .lqg import LQG as LQG
+from .lqg import lqg as lqg
 from .minimise import Minimum as Minimum
+from .minimise import Stepper as Stepper
 from .minimise import minimise as minimise
-
-# Feedback
+from .move_problem import Problem as Problem
+from .move_problem import standard_start as standard_start
+from .pareto import ParetoFront as ParetoFront
+from .pareto import pareto_front as pareto_front
 from .pd import GAINS as GAINS
 from .pd import PD as PD
 from .pd import OpenLoop as OpenLoop
+from .pid import PID as PID
+from .pid import StrainRateFeedback as StrainRateFeedback
 from .references import AbstractProfile as AbstractProfile
 from .references import BangBang as BangBang
 from .references import MinimumJerk as MinimumJerk
@@ -38,6 +68,10 @@ from .references import Sampled as Sampled
 from .references import SCurve as SCurve
 from .references import Step as Step
 from .references import Trapezoid as Trapezoid
+from .riccati import kalman_gain as kalman_gain
+from .riccati import lqr_gain as lqr_gain
+from .riccati import solve_care as solve_care
+from .riccati import solve_dare as solve_dare
 
 # Input shapers
 from .shapers import CLASSICAL as CLASSICAL
@@ -50,9 +84,11 @@ from .shapers import unshaped as unshaped
 from .shapers import zv as zv
 from .shapers import zvd as zvd
 from .shapers import zvdd as zvdd
-from .tuning import Problem as Problem
+from .task import Limits as Limits
+from .task import Outcome as Outcome
+from .task import Task as Task
+from .task import Weights as Weights
+from .tuning import AbstractProblem as AbstractProblem
+from .tuning import Freely as Freely
 from .tuning import Tuned as Tuned
-from .tuning import Weights as Weights
-from .tuning import cost as cost
-from .tuning import standard_start as standard_start
 from .tuning import tune as tune

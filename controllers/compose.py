@@ -91,8 +91,7 @@ class Filtered(AbstractController):
         inner, states = memory
         asked = self.law.command(t, inner, measurement, setpoint)
         slopes = tuple(
-            None if f is None else f.rate(x, u)
-            for f, x, u in zip(self.filters, states, asked, strict=True)
+            None if f is None else f.rate(x, u) for f, x, u in zip(self.filters, states, asked, strict=True)
         )
         return self.law.rate(t, inner, measurement, setpoint), slopes
 

@@ -1,7 +1,5 @@
 """PID control that does not wind up, and damping by the strain gauge."""
 
-from typing import Literal
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
@@ -30,9 +28,7 @@ class PID(AbstractController):
     integral: tuple[Scalar, ...] = eqx.field(converter=scalars)
     limit: tuple[Scalar, ...] = eqx.field(converter=scalars)
     tracking_time: Scalar = eqx.field(converter=scalar, default=0.1)
-    anti_windup: Literal["back_calculation", "clamping", "none"] = eqx.field(
-        static=True, default="back_calculation"
-    )
+    anti_windup: str = eqx.field(static=True, default="back_calculation")
 
     def __check_init__(self):
         joints = len(self.pd.stiffness)

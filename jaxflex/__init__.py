@@ -77,6 +77,7 @@ from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 from .scalars import Scalar as Scalar
 from .scalars import ScalarLike as ScalarLike
+from .scalars import optional_scalar as optional_scalar
 from .scalars import scalar as scalar
 from .sensors import Sensor as Sensor
 from .sensors import quantised as quantised

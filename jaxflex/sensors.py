@@ -113,7 +113,7 @@ def tip_accelerations(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> l
     return [tip_slopes[i].y + frames[i].rate * tips[i].x for i in range(count)]
 
 
-def quantised(signal: Float[Array, "*times"], step: Scalar) -> Float[Array, "*times"]:
+def quantised(signal: Float[Array, "*times"] | float, step: Scalar) -> Float[Array, "*times"]:
     """`signal` rounded to whole multiples of `step`, as it is where that is zero.
 
     Rounding passes the gradient through unchanged.

@@ -84,9 +84,7 @@ def cut_loop(arm: Arm, pose: Float[Array, " joints"], controller: AbstractContro
 
 
 @eqx.filter_jit
-def _cut_loop(
-    model: AssembledArm, pose: Float[Array, " joints"], controller: AbstractController
-) -> CutLoop:
+def _cut_loop(model: AssembledArm, pose: Float[Array, " joints"], controller: AbstractController) -> CutLoop:
     zero, period = scalar(0.0), controller.period()
     angles = tuple(scalar(a) for a in pose)
     reference = resting_reference(Setpoint(angles, (zero,) * len(angles), (zero,) * len(angles)))
@@ -159,7 +157,8 @@ def _grid(loop: CutLoop) -> Float[Array, " frequencies"]:
     width = jnp.maximum(jnp.abs(poles.real), 1e-4 * size)
     near = jnp.abs(poles.imag)[:, None] + width[:, None] * jnp.sinh(jnp.linspace(-4.0, 4.0, AROUND))
     if loop.period is not None:
-        high = jnp.pi / jax.lax.stop_gradient(loop.period)
+        # a little past half the sampling frequency, where L is real and may cross the axis
+        high = 1.001 * jnp.pi / jax.lax.stop_gradient(loop.period)
     wide = jnp.geomspace(low, high, GRID)
     return jnp.sort(jnp.clip(jnp.concatenate([wide, near.ravel()]), low, high))
 
