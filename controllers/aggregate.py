@@ -1,5 +1,6 @@
 """One number from many: how costs over payloads, or other scenarios, become the cost of a design."""
 
+import dataclasses
 from abc import abstractmethod
 
 import equinox as eqx
@@ -7,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxflex import Arm, Scalar, ScalarLike, scalar
+from jaxflex import Arm, Scalar
 
 Costs = Float[Array, " scenarios"]
 
@@ -92,21 +93,16 @@ def varied(
     if damping is not None and any(isinstance(link.damping_ratio, str) for link in arm.links):
         raise ValueError("varied: the damping of a link is a rule ('ahmad'); give it as a ratio to vary it.")
 
-    def one(mass: ScalarLike, stiff: ScalarLike, damp: ScalarLike) -> Arm:
+    def one(mass: Scalar, stiff: Scalar, damp: Scalar) -> Arm:
+        def link_of(link):
+            ratios = link.damping_ratio
+            ratios = ratios if isinstance(ratios, str) else tuple(z * damp for z in ratios)
+            return dataclasses.replace(
+                link, flexural_rigidity=link.flexural_rigidity * stiff, damping_ratio=ratios
+            )
+
         changed = arm.with_payload(mass)
-        changed = eqx.tree_at(
-            lambda a: [link.flexural_rigidity for link in a.links],
-            changed,
-            [link.flexural_rigidity * scalar(stiff) for link in arm.links],
-        )
-        if damping is None:
-            return changed
-        return eqx.tree_at(
-            lambda a: [link.damping_ratio for link in a.links],
-            changed,
-            [jax.tree_util.tree_map(lambda z: z * damp, link.damping_ratio) for link in arm.links],
-            is_leaf=lambda x: isinstance(x, tuple),
-        )
+        return eqx.tree_at(lambda a: a.links, changed, tuple(map(link_of, changed.links)))
 
     return eqx.filter_vmap(one)(
         payloads, ones if stiffness is None else stiffness, ones if damping is None else damping

@@ -73,7 +73,7 @@ def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
 
 
 def _start(stepper: Stepper, free: Free, args: PyTree):
-    shapes = jax.eval_shape(stepper.objective, free, args)
+    shapes = eqx.filter_eval_shape(stepper.objective, free, args)
     options = {"autodiff_mode": "fwd"}
     fn = with_gradient(stepper.objective)
     return stepper.minimiser.init(fn, free, args, options, *shapes, frozenset())

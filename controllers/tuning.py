@@ -151,7 +151,7 @@ def tune(
     points = scattered(problem.free(first), starts, seed)
     stepper = Stepper(lagrangian, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4))
     args = (problem, first)
-    probe = jax.eval_shape(lambda p: lagrangian(p, (args, (jnp.zeros(()), jnp.ones(())))), points[0])
+    probe = eqx.filter_eval_shape(lagrangian, points[0], (args, (jnp.zeros(()), jnp.ones(()))))
     count = probe[1][1].shape[0]
     together = min(together, starts, descents)
 
