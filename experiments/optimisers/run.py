@@ -17,7 +17,7 @@ def at(trace: np.ndarray, column: int, budget: float) -> float:
 
 def run(folder: Path, reduced: bool) -> dict:
     """Run every method from every start and compare what it reached."""
-    simulations, seconds, repeats = (300, 0.0, 2) if reduced else (4000, 15.0, 5)
+    simulations, seconds, repeats = (300, 0.0, 2) if reduced else (3000, 8.0, 4)
     counter = Counter(*single_link(reduced), batch=12)
     traces: dict[str, list[np.ndarray]] = {name: [] for name in METHODS}
     for seed, start in enumerate(starts(counter, repeats)):
