@@ -1,6 +1,8 @@
 """Controllers made of controllers: sums, filters behind them, the hold of a digital drive."""
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
 import equinox as eqx
 from jaxtyping import PyTree
@@ -32,7 +34,7 @@ class Sum(AbstractController):
     ) -> tuple[Scalar, ...]:
         """Sum of the commands, joint by joint."""
         commands = [law.command(t, m, measurement, setpoint) for law, m in self._pairs(memory)]
-        return tuple(sum(values[1:], values[0]) for values in zip(*commands, strict=True))
+        return tuple(reduce(add, values) for values in zip(*commands, strict=True))
 
     def rate(self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint) -> PyTree:
         """Rates of the memories."""

@@ -35,6 +35,7 @@ def commands(model: AssembledArm, torques: tuple, rates: tuple) -> tuple:
     found = []
     for joint, torque, rate in zip(model.joints, torques, rates, strict=True):
         motor = joint.motor
+        assert motor is not None, "an arm with this drive has a motor at every joint"
         current = torque / motor.joint_torque(jnp.ones_like(torque))
         emf = -motor.armature_voltage(jnp.zeros_like(rate), rate)
         found.append(current if model.arm.drive == "current" else motor.resistance * current + emf)

@@ -73,10 +73,10 @@ def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
 
 
 def _start(stepper: Stepper, free: Free, args: PyTree):
-    shapes = eqx.filter_eval_shape(stepper.objective, free, args)
+    cost, aux = eqx.filter_eval_shape(stepper.objective, free, args)
     options = {"autodiff_mode": "fwd"}
     fn = with_gradient(stepper.objective)
-    return stepper.minimiser.init(fn, free, args, options, *shapes, frozenset())
+    return stepper.minimiser.init(fn, free, args, options, cost, aux, frozenset())
 
 
 def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):

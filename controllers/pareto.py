@@ -50,7 +50,7 @@ def pareto_front(
     for number, move_time in enumerate(slowest_first, 1):
         paced = at_pace(problem, float(move_time / problem.total_time()))
         tuned = tune(paced, values, **options)
-        residual = float(np.max(tuned.measures["residual_vibration"]))
+        residual = float(np.max((tuned.measures or {})["residual_vibration"]))
         found.append((residual, tuned))
         values = tuned.values
         if progress is not None:

@@ -141,9 +141,9 @@ def margins(arm: Arm, pose: Float[Array, " joints"], controller: AbstractControl
 @eqx.filter_jit
 def _all_margins(loop: CutLoop) -> Margins:
     grid = _grid(loop)
-    each = [_margins(loop, i, grid) for i in range(loop.B.shape[1])]
+    gain, down, phase, modulus = zip(*(_margins(loop, i, grid) for i in range(loop.B.shape[1])), strict=True)
     decay = -jnp.max(loop.poles().real)
-    return Margins(*(jnp.stack(values) for values in zip(*each, strict=True)), decay)
+    return Margins(jnp.stack(gain), jnp.stack(down), jnp.stack(phase), jnp.stack(modulus), decay)
 
 
 def _grid(loop: CutLoop) -> Float[Array, " frequencies"]:

@@ -13,6 +13,7 @@ import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from controllers import (
+    GAINS,
     Assessment,
     Design,
     Move,
@@ -294,11 +295,15 @@ def conclusion(comparison: Comparison, tuned: Tuned, arm: Arm) -> str:
 def design_table(design: Design) -> Table:
     """The parameters of a design."""
     table = Table("parameters of the tuned design", ["parameter", "unit", "values"])
-    rows = [
-        ("stiffness gain", "V/rad", design.controller.stiffness),
-        ("damping gain", "V s/rad", design.controller.damping),
-        ("rate feedforward", "V s/rad", design.controller.rate_feedforward),
-        ("acceleration feedforward", "V s²/rad", design.controller.acceleration_feedforward),
+    titles = (
+        ("stiffness gain", "V/rad"),
+        ("damping gain", "V s/rad"),
+        ("rate feedforward", "V s/rad"),
+        ("acceleration feedforward", "V s²/rad"),
+    )
+    gains = [getattr(design.controller, name) for name in GAINS]
+    rows = [(*title, values) for title, values in zip(titles, gains, strict=True)]
+    rows += [
         ("shaper amplitudes", "1", design.shaper.amplitudes),
         ("shaper delays", "s", design.shaper.delays),
     ]

@@ -127,6 +127,7 @@ class Plant(eqx.Module):
         setpoint = self.reference.setpoint(t)
         measurement = self.measurement(state)
         held = self.controller.command(t, state.memory, measurement, setpoint)
+        assert self.sample_time is not None
         memory = self.controller.advance(self.sample_time, t, state.memory, measurement, setpoint)
         return state._replace(memory=memory, held=held)
 
