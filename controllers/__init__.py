@@ -1,4 +1,4 @@
-"""Controllers for flexible arms: references, input shapers, PD control and gradient tuning."""
+"""Controllers for flexible arms: references, input shapers, feedback laws and gradient tuning."""
 
 # What the joints should do
 # How a design fares, and how it is tuned

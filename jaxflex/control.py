@@ -71,8 +71,8 @@ class AbstractController(eqx.Module):
     """A control law: measurement and setpoint in, one command for every joint out.
 
     The command is a voltage [V], current [A] or torque [N m], as the arm's drive says.
-    A controller with memory keeps it in a pytree of scalars, a part of the simulated
-    state: `rate` is its time derivative, integrated by the solver under continuous
+    A controller with memory keeps it in a pytree of arrays, scalars for speed, a part of the
+    simulated state: `rate` is its time derivative, integrated by the solver under continuous
     control; under sampled control `advance` takes it from one sample to the next. A
     controller with a `period` is sampled wherever it is simulated.
     """

@@ -9,7 +9,7 @@ import controllers as ctl
 import jaxflex as jf
 
 from . import pictures
-from .laws import PERIOD, laws, link, on_a_drive
+from .laws import HUB, PERIOD, laws, link, on_a_drive
 
 MOVE = ctl.Move((0.0,), (0.8,), 0.35)
 
@@ -39,10 +39,10 @@ def run(folder: Path, reduced: bool) -> dict:
     for name in names:
         figures["continuous"][name], runs[name] = measure(arm, theory[name])
         figures["on a drive"][name], _ = measure(arm, on_a_drive(sampled[name]))
-    interval, trials = 5e-3, 3 if reduced else 10
+    interval, trials = 2e-3, 3 if reduced else 10
     held = ctl.ZeroOrderHold(theory["PD"], interval)
-    model = jf.foldager_link(0.0, modes=1)  # the payload is not known to it
-    response = ctl.impulse_response(model, jnp.stack(MOVE.stop), held, 100)
+    model = jf.foldager_link(0.0, modes=1, hub_inertia=HUB)  # the payload is not known to it
+    response = ctl.impulse_response(model, jnp.stack(MOVE.stop), held, 250)
     learned = ctl.learn(arm, held, MOVE, ctl.learning_gain(response, 0.05), interval, trials)
     figures["learning"] = {"rms_joint_error_mrad": (1e3 * learned.errors).tolist()}
     pictures.responses(runs, learned.errors, float(MOVE.duration)).savefig(folder / "feedback.png", dpi=130)

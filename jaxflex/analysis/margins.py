@@ -24,7 +24,7 @@ GRID, AROUND, CROSSINGS, HALVINGS = 400, 24, 12, 50
 
 
 class Margins(NamedTuple):
-    """Margins of a loop, an entry a joint but for `decay`.
+    """Margins of a loop, an entry a joint but for `decay`; of a loop that is stable, or they mean nothing.
 
     - `gain`: the smallest factor above 1 on the joint's command at which the loop starts
       to swing (infinite if there is none), and `gain_down` the largest below 1 (or zero)

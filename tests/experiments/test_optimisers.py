@@ -19,6 +19,7 @@ def test_every_method_improves_and_is_given_the_same(figures):
 
 def test_the_gradient_leads_at_equal_simulations(figures):
     reached = {
-        name: np.median(method["cost_at_equal_simulations"][-1]) for name, method in figures["methods"].items()
+        name: np.median(method["cost_at_equal_simulations"][-1])
+        for name, method in figures["methods"].items()
     }
     assert reached["gradient (BFGS)"] == min(reached.values())
