@@ -17,7 +17,7 @@ def at(trace: np.ndarray, column: int, budget: float) -> float:
 
 def run(folder: Path, reduced: bool) -> dict:
     """Run every method from every start and compare what it reached."""
-    simulations, seconds, repeats = (300, 0.0, 2) if reduced else (3000, 8.0, 4)
+    simulations, seconds, repeats = (300, 0.0, 2) if reduced else (1500, 4.0, 3)
     counter = Counter(*single_link(reduced), batch=12)
     traces: dict[str, list[np.ndarray]] = {name: [] for name in METHODS}
     for seed, start in enumerate(starts(counter, repeats)):
@@ -26,6 +26,7 @@ def run(folder: Path, reduced: bool) -> dict:
                 method(counter.begin(simulations, seconds), start, seed)
             except Spent:
                 traces[name].append(np.array(counter.trace))
+                print(f"{name}, start {seed + 1}: {counter.best:.3f} after {counter.spent} simulations")
     least = min(trace[:, 2].min() for found in traces.values() for trace in found)
     budgets = [int(b) for b in np.geomspace(simulations / 16, simulations, 5)]
     moments = [float(b) for b in np.geomspace(max(seconds, 0.5) / 16, max(seconds, 0.5), 5)]

@@ -31,8 +31,13 @@ def robustness(
             axis.axvline(mark, color="0.5", linewidth=0.8, linestyle=":")
         if what == "damping":
             axis.set_xscale("log")
+            axis.set_xticks([0.2, 0.5, 1, 2, 5], ["0.2", "0.5", "1", "2", "5"])
+            axis.minorticks_off()
+        axis.set_ylim(0.03, 100)
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
         axis.set_xlabel(label)
     axes[0, 0].set_ylabel("residual tip vibration [mm]")
     axes[0, 0].set_title("dotted: tuned on", fontsize=8, loc="left")
-    axes[0, -1].legend(frameon=False, fontsize=7)
+    axes[0, 1].legend(frameon=False, fontsize=7, loc="lower left")
     return made

@@ -76,7 +76,7 @@ def run(folder: Path, reduced: bool) -> dict:
     picture.savefig(folder / "pareto.png", dpi=130)
 
     factors = np.linspace(0.8, 1.2, 5 if reduced else 13)
-    chosen = {"textbook PD, unshaped": ctl.unshaped_design(posed.start, posed.move, total)}
+    chosen = {"textbook PD with feedforward": ctl.unshaped_design(posed.start, posed.move, total)}
     kept = {}
     for name, aggregate in AGGREGATES.items():
         again = ctl.Problem(

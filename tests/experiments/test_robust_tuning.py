@@ -17,7 +17,7 @@ def test_the_front_lies_below_the_unshaped_moves(figures):
 
 def test_tuned_designs_hold_on_arms_they_were_not_tuned_on(figures):
     for sweep in figures["sweeps"].values():
-        textbook = np.max(sweep["textbook PD, unshaped"])
+        textbook = np.max(sweep["textbook PD with feedforward"])
         for name, residual in sweep.items():
             if name.startswith("tuned"):
                 assert np.max(residual) < textbook
