@@ -33,6 +33,12 @@ class Instrumented(AbstractController):
         return self.law.period()
 
     def _counts(self, measurement: Measurement) -> tuple[tuple, tuple]:
+        joints = len(measurement.angle)
+        if not len(self.angle_step) == len(self.curvature_step) == joints:
+            raise ValueError(
+                f"Instrumented: angle_step and curvature_step are needed once a joint, {joints} each; "
+                f"found {len(self.angle_step)} and {len(self.curvature_step)}."
+            )
         angles = tuple(map(quantised, measurement.angle, self.angle_step))
         curvatures = tuple(map(quantised, measurement.curvature, self.curvature_step))
         return angles, curvatures

@@ -30,6 +30,7 @@ def race(traces: Mapping[str, Sequence[np.ndarray]], simulations: float, seconds
                 grid[known], np.median(curves, axis=0)[known], color=f"C{number}", label=name, linewidth=1.8
             )
         axis.set_xscale("log")
+        axis.set_ylim(-6.2, -2.0)  # the starts, some of which fail, cost up to 70
         axis.set_xlabel(label)
     axes[0, 0].set_ylabel("best cost so far (logarithmic) [1]")
     axes[0, 0].legend(frameon=False, fontsize=8)

@@ -135,6 +135,13 @@ def test_a_real_drive_is_its_difference_equation():
     np.testing.assert_allclose(run["angle_1"], expected, atol=1e-8)
 
 
+def test_instruments_are_needed_once_a_joint():
+    arm = jf.Arm((), (jf.Joint(hub_inertia=1.0), jf.Joint(hub_inertia=1.0)))
+    law = ZeroOrderHold(Instrumented(PD((1.0, 1.0), (0.1, 0.1)), 1e-3, 0.0, 1e-2), 1e-2)
+    with pytest.raises(ValueError, match="once a joint, 2 each; found 1 and 1"):
+        jf.simulate(arm, law, Step((0.0, 0.0), (1.0, 1.0)), jnp.linspace(0.0, 0.1, 3))
+
+
 def test_a_law_made_for_a_period_is_simulated_at_it():
     law = ZeroOrderHold(PD((2.0,), (0.15,)), 0.01)
     times = jnp.linspace(0.0, 0.2, 21)
