@@ -1,46 +1,7 @@
-"""Controllers for flexible arms: references, input shapers, PD control and gradient tuning."""
+"""Controllers for flexible arms: references, input shapers, feedback laws and gradient tuning."""
+# ruff: noqa: I001 -- by subject, as a table of contents
 
 # What the joints should do
-# How a design fares, and how it is tuned
-from .assess import Assessment as Assessment
-from .assess import assess as assess
-from .assess import measure as measure
-from .assess import run as run
-from .assess import with_payloads as with_payloads
-from .bijections import AbstractBijection as AbstractBijection
-from .bijections import Delays as Delays
-from .bijections import Interval as Interval
-from .bijections import Positive as Positive
-from .bijections import Simplex as Simplex
-
-# Designs to compare
-from .designs import Design as Design
-from .designs import classical_designs as classical_designs
-from .designs import default_move as default_move
-from .designs import ringing_mode as ringing_mode
-from .designs import stack as stack
-from .designs import textbook_pd as textbook_pd
-from .designs import unshaped_design as unshaped_design
-from .designs import with_duration as with_duration
-from .free_shaper import FreeMotion as FreeMotion
-from .free_shaper import TunedShaper as TunedShaper
-from .free_shaper import free_motion as free_motion
-from .free_shaper import shaped_residual as shaped_residual
-from .free_shaper import stack_motions as stack_motions
-from .free_shaper import step_motion as step_motion
-from .free_shaper import tip_after as tip_after
-from .free_shaper import tune_shaper as tune_shaper
-from .minimise import Minimum as Minimum
-from .minimise import minimise as minimise
-
-# Feedback
-from .pd import GAINS as GAINS
-from .pd import PD as PD
-from .pd import OpenLoop as OpenLoop
-from .recommend import ALTERNATING as ALTERNATING
-from .recommend import Rated as Rated
-from .recommend import rate_shapers as rate_shapers
-from .recommend import recommend as recommend
 from .references import AbstractProfile as AbstractProfile
 from .references import BangBang as BangBang
 from .references import MinimumJerk as MinimumJerk
@@ -76,9 +37,86 @@ from .shapers import zero_placement as zero_placement
 from .shapers import zv as zv
 from .shapers import zvd as zvd
 from .shapers import zvdd as zvdd
-from .tuning import Problem as Problem
+from .free_shaper import FreeMotion as FreeMotion
+from .free_shaper import TunedShaper as TunedShaper
+from .free_shaper import free_motion as free_motion
+from .free_shaper import shaped_residual as shaped_residual
+from .free_shaper import stack_motions as stack_motions
+from .free_shaper import step_motion as step_motion
+from .free_shaper import tip_after as tip_after
+from .free_shaper import tune_shaper as tune_shaper
+from .recommend import ALTERNATING as ALTERNATING
+from .recommend import Rated as Rated
+from .recommend import rate_shapers as rate_shapers
+from .recommend import recommend as recommend
+
+# Feedback laws, and what a drive makes of them
+from .pd import GAINS as GAINS
+from .pd import PD as PD
+from .pd import OpenLoop as OpenLoop
+from .pid import PID as PID
+from .pid import StrainRateFeedback as StrainRateFeedback
+from .biquad import Biquad as Biquad
+from .biquad import notch as notch
+from .compose import Filtered as Filtered
+from .compose import Sum as Sum
+from .compose import ZeroOrderHold as ZeroOrderHold
+from .instruments import Instrumented as Instrumented
+from .inverse_dynamics import ComputedTorque as ComputedTorque
+from .inverse_dynamics import InverseDynamics as InverseDynamics
+from .riccati import kalman_gain as kalman_gain
+from .riccati import lqr_gain as lqr_gain
+from .riccati import solve_care as solve_care
+from .riccati import solve_dare as solve_dare
+from .lqg import LQG as LQG
+from .lqg import lqg as lqg
+from .learning import Learned as Learned
+from .learning import Replayed as Replayed
+from .learning import impulse_response as impulse_response
+from .learning import learn as learn
+from .learning import learning_gain as learning_gain
+
+# Designs, and how they fare
+from .designs import Design as Design
+from .designs import NoRinging as NoRinging
+from .designs import classical_designs as classical_designs
+from .designs import default_move as default_move
+from .designs import ringing_mode as ringing_mode
+from .designs import stack as stack
+from .designs import textbook_pd as textbook_pd
+from .designs import unshaped_design as unshaped_design
+from .designs import with_duration as with_duration
+from .assess import Assessment as Assessment
+from .assess import assess as assess
+from .assess import measure as measure
+from .assess import run as run
+from .assess import with_payloads as with_payloads
+from .aggregate import AbstractAggregate as AbstractAggregate
+from .aggregate import Blend as Blend
+from .aggregate import ConditionalValueAtRisk as ConditionalValueAtRisk
+from .aggregate import Mean as Mean
+from .aggregate import Worst as Worst
+from .aggregate import likely as likely
+from .aggregate import varied as varied
+from .task import Limits as Limits
+from .task import Outcome as Outcome
+from .task import Task as Task
+from .task import Weights as Weights
+
+# Tuning
+from .bijections import AbstractBijection as AbstractBijection
+from .bijections import Delays as Delays
+from .bijections import Interval as Interval
+from .bijections import Positive as Positive
+from .bijections import Simplex as Simplex
+from .minimise import Minimum as Minimum
+from .minimise import Stepper as Stepper
+from .minimise import minimise as minimise
+from .tuning import AbstractProblem as AbstractProblem
+from .tuning import Freely as Freely
 from .tuning import Tuned as Tuned
-from .tuning import Weights as Weights
-from .tuning import cost as cost
-from .tuning import standard_start as standard_start
 from .tuning import tune as tune
+from .move_problem import Problem as Problem
+from .move_problem import standard_start as standard_start
+from .pareto import ParetoFront as ParetoFront
+from .pareto import pareto_front as pareto_front

@@ -33,8 +33,8 @@ class Positive(AbstractBijection):
         return jnp.exp(free)
 
     def free(self, value: Value) -> Free:
-        """`log(value)`."""
-        return jnp.log(value)
+        """`log(value)`; zero counts as 1e-9."""
+        return jnp.log(jnp.maximum(value, 1e-9))
 
 
 class Interval(AbstractBijection):

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxflex import (
+    AbstractController,
     Arm,
     Scalar,
     ScalarLike,
@@ -24,9 +25,9 @@ OSCILLATORY = 0.7  # a mode damped more than this does not ring
 
 
 class Design(eqx.Module):
-    """What is compared: PD gains, the move they follow, and the shaper that smooths it."""
+    """What is compared: a controller, the move it follows, and the shaper that smooths it."""
 
-    controller: PD
+    controller: AbstractController
     move: Move
     shaper: Shaper
 
@@ -81,28 +82,42 @@ def textbook_pd(
     return PD(*gains, tuple(rate), tuple(acceleration)) if feedforward else PD(*gains)
 
 
-def ringing_mode(arm: Arm, pose: Float[Array, " joints"], controller: PD) -> tuple[Scalar, Scalar]:
+def ringing_mode(
+    arm: Arm, pose: Float[Array, " joints"], controller: AbstractController
+) -> tuple[Scalar, Scalar]:
     """Frequency [Hz] and damping ratio of the mode that a classical shaper should cancel.
 
     The slowest mode of the closed loop at `pose` that rings at all, with a damping ratio
     below 0.7. Not for use under `jit`.
+
+    **Raises** `NoRinging` if none rings.
     """
     modes = closed_loop_modes(linearise(arm, pose, controller, ()))
     rings = (modes.damping_ratio < OSCILLATORY) & (modes.frequency > 0)
     if not bool(rings.any()):
-        raise ValueError("no mode of the closed loop rings: a shaper has nothing to cancel.")
+        raise NoRinging("no mode of the closed loop rings: a shaper has nothing to cancel.")
     first = int(jnp.argmax(rings))
     return modes.frequency[first], jnp.maximum(modes.damping_ratio[first], 0.0)
 
 
-def classical_designs(arm: Arm, controller: PD, move: Move, total_time: ScalarLike) -> dict[str, Design]:
+class NoRinging(ValueError):
+    """No mode of a loop rings, so there is none for a shaper to cancel."""
+
+
+def classical_designs(
+    arm: Arm, controller: AbstractController, move: Move, total_time: ScalarLike
+) -> dict[str, Design]:
     """A design for every classical shaper with these gains, each lasting `total_time` [s].
 
     The shaper is designed for the slowest ringing mode of `arm` with its payload, at the
     end of the move; the move is then stretched or shortened so that with the shaper it
-    lasts `total_time`. A shaper longer than nine tenths of that is left out.
+    lasts `total_time`. A shaper longer than nine tenths of that is left out, and
+    all of them where no mode rings.
     """
-    frequency, damping_ratio = ringing_mode(arm, jnp.stack(move.stop), controller)
+    try:
+        frequency, damping_ratio = ringing_mode(arm, jnp.stack(move.stop), controller)
+    except NoRinging:
+        return {}
     designs = {}
     for name, make in CLASSICAL.items():
         shaper = make(frequency, damping_ratio)
@@ -117,8 +132,10 @@ def with_duration(move: Move, duration: ScalarLike) -> Move:
     return eqx.tree_at(lambda m: m.duration, move, scalar(duration))
 
 
-def unshaped_design(controller: PD, move: Move, total_time: ScalarLike | None = None) -> Design:
-    """PD alone, on the move as it is or stretched to `total_time` [s]."""
+def unshaped_design(
+    controller: AbstractController, move: Move, total_time: ScalarLike | None = None
+) -> Design:
+    """A controller alone, on the move as it is or stretched to `total_time` [s]."""
     if total_time is not None:
         move = with_duration(move, total_time)
     return Design(controller, move, unshaped())

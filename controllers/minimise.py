@@ -1,26 +1,27 @@
-"""Minimise a cost by gradient, step by step, so that progress can be seen and time limited."""
+"""Minimise a cost by gradient, step by step, several starts at once, so that progress can be seen."""
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from jaxflex import Scalar
 
 Free = Float[Array, " free"]
+Starts = Float[Array, "starts free"]
 
 
 class Minimum(NamedTuple):
     """Where a minimisation ended.
 
-    `free` the best point met, `cost` there, `history` of the best cost after every step,
-    `steps` taken, and `reason` it stopped, in words.
+    `free` the best point met, `cost` there and `aux` what else the objective said of it,
+    `history` of the best cost after every step, `steps` taken, and `reason` it stopped, in words.
     """
 
     free: Free
@@ -28,81 +29,129 @@ class Minimum(NamedTuple):
     history: list[float]
     steps: int
     reason: str
+    aux: Any = None
 
 
-def with_gradient(cost: Callable[[Free], Scalar]) -> Callable[[Free], Scalar]:
-    """`cost`, whose derivative is computed together with it, forwards, all parameters at once.
+class Stepper(eqx.Module):
+    """What is minimised and how.
 
-    A minimiser that linearises its function then runs the simulation once a step.
+    `objective(free, args)` returns a cost and, as a pytree of arrays, whatever else is
+    worth knowing of a point. `minimiser` is one of optimistix: `BFGS`, `NelderMead`, or
+    any of optax as `optx.OptaxMinimiser(optax.adam(0.05), rtol, atol)`. Programs are
+    compiled once for an objective and a minimiser, whatever the `args`.
     """
 
-    @jax.custom_jvp
-    def call(free):
-        return cost(free)
+    objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]
+    minimiser: optx.AbstractMinimiser
 
-    @call.defjvp
-    def _(primals, tangents):
-        def twice(x):
-            value = cost(x)
-            return value, value
 
-        gradient, value = jax.jacfwd(twice, has_aux=True)(primals[0])
-        return value, jnp.dot(gradient, tangents[0])
+def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
+    """`objective`, its derivative computed together with it, forwards, all parameters at once.
+
+    A minimiser that linearises its function then runs the simulation once a step. What
+    the objective returns beside its cost has no derivative.
+    """
+
+    def call(free, args):
+        @jax.custom_jvp
+        def of(free):
+            return objective(free, args)
+
+        @of.defjvp
+        def _(primals, tangents):
+            def twice(x):
+                value, aux = objective(x, args)
+                return value, (value, aux)
+
+            gradient, (value, aux) = jax.jacfwd(twice, has_aux=True)(primals[0])
+            nothing = jax.tree_util.tree_map(jnp.zeros_like, aux)
+            return (value, aux), (jnp.dot(gradient, tangents[0]), nothing)
+
+        return of(free)
 
     return call
 
 
-def make_stepper(cost: Callable[[Free], Scalar], minimiser: optx.AbstractMinimiser, example: Free):
-    """Functions `start(free)` and `step(free, state)`, compiled once for all starts."""
+def _start(stepper: Stepper, free: Free, args: PyTree):
+    cost, aux = eqx.filter_eval_shape(stepper.objective, free, args)
     options = {"autodiff_mode": "fwd"}
-    cost = with_gradient(cost)
-    shape = jax.eval_shape(lambda: jnp.zeros((), example.dtype))
+    fn = with_gradient(stepper.objective)
+    return stepper.minimiser.init(fn, free, args, options, cost, aux, frozenset())
 
-    def fn(free, args):
-        return cost(free), None
 
-    @eqx.filter_jit
-    def start(free):
-        return minimiser.init(fn, free, None, options, shape, None, frozenset())
+def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
+    """One step: the point it judged, with its cost and aux, and where it goes on from."""
+    options = {"autodiff_mode": "fwd"}
+    fn = with_gradient(stepper.objective)
+    minimiser = stepper.minimiser
+    after, new, aux = minimiser.step(fn, free, args, options, state, frozenset())
+    done, result = minimiser.terminate(fn, after, args, options, new, frozenset())
+    if hasattr(new, "f_info"):  # quasi-Newton: it returns the last point accepted
+        judged = after, new.f_info.f, new.aux
+    elif hasattr(new, "f"):  # optax: it returns the next point, not judged yet
+        judged = free, new.f, aux
+    else:
+        raise TypeError(
+            f"minimise: {type(minimiser).__name__} does not say what its points cost; give BFGS, LBFGS, "
+            "another quasi-Newton minimiser of optimistix, or an OptaxMinimiser."
+        )
+    return judged, after, new, done, result == optx.RESULTS.successful
 
-    @eqx.filter_jit
-    def step(free, state):
-        free, state, _ = minimiser.step(fn, free, None, options, state, frozenset())
-        done, result = minimiser.terminate(fn, free, None, options, state, frozenset())
-        return free, state, done, result == optx.RESULTS.successful
 
-    return start, step
+@eqx.filter_jit
+def _start_all(stepper: Stepper, free: Starts, args: PyTree, own: PyTree):
+    return eqx.filter_vmap(lambda x, o: _start(stepper, x, (args, o)))(free, own)
+
+
+@eqx.filter_jit
+def _step_all(stepper: Stepper, free: Starts, state: PyTree, args: PyTree, own: PyTree):
+    return eqx.filter_vmap(lambda x, s, o: _step(stepper, x, s, (args, o)))(free, state, own)
 
 
 def minimise(
-    stepper,
-    free: Free,
+    stepper: Stepper,
+    free: Starts,
     max_steps: int,
+    args: PyTree = None,
+    own: PyTree = None,
     seconds: float | None = None,
     progress: Callable[[int, float], None] | None = None,
-) -> Minimum:
-    """Run a stepper from `free` until it has converged, or for `max_steps` or `seconds`.
+) -> list[Minimum]:
+    """Go down from every row of `free` at once, until all have converged, or for `max_steps` or `seconds`.
 
-    A cost that is not finite is no better than any other: the search backs away from
-    it. `progress(step, best cost)` is called after every step.
+    The objective is called with `(args, own)`: `args` the same for every start, `own`
+    with a leading axis of starts. A cost that is not finite is no better than any other: the search backs away
+    from it. `progress(step, best cost)` is called after every step.
     """
-    start, step = stepper
-    began = time.monotonic()
-    state = start(free)
-    best, best_cost, history = free, np.inf, []
-    reason = f"stopped after the {max_steps} steps allowed, not converged"
+    began, count = time.monotonic(), free.shape[0]
+    state = _start_all(stepper, free, args, own)
+    best: list = [None] * count
+    costs, histories = np.full(count, np.inf), [[] for _ in range(count)]
+    reasons = [f"stopped after the {max_steps} steps allowed, not converged"] * count
+    over = np.zeros(count, bool)
     for number in range(1, max_steps + 1):
-        free, state, done, good = step(free, state)
-        cost = float(state.f_info.f)
-        if np.isfinite(cost) and cost < best_cost:
-            best, best_cost = free, cost
-        history.append(best_cost)
+        judged, free_next, state, done, good = _step_all(stepper, free, state, args, own)
+        (points, values, aux), free = judged, free_next
+        values = np.asarray(values)
+        for i in np.flatnonzero(~over):
+            better = np.isfinite(values[i]) and values[i] < costs[i]
+            if better or best[i] is None:
+                best[i] = points[i], jax.tree_util.tree_map(lambda leaf, i=i: np.asarray(leaf[i]), aux)
+            if better:
+                costs[i] = values[i]
+            histories[i].append(float(costs[i]))
+            if done[i]:
+                reasons[i] = "converged" if good[i] else "stopped: the minimiser failed"
+                over[i] = True
         if progress is not None:
-            progress(number, best_cost)
-        if bool(done):
-            reason = "converged" if bool(good) else "stopped: the minimiser failed"
+            progress(number, float(costs.min()))
+        if over.all():
             break
         if seconds is not None and time.monotonic() - began > seconds:
-            reason = f"stopped after the {seconds:g} s allowed, not converged"
+            for i in np.flatnonzero(~over):
+                reasons[i] = f"stopped after the {seconds:g} s allowed, not converged"
             break
-    return Minimum(best, best_cost, history, len(history), reason)
+    return [
+        Minimum(best[i][0], float(costs[i]), histories[i], len(histories[i]), reasons[i], best[i][1])
+        for i in range(count)
+    ]

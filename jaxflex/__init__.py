@@ -12,6 +12,11 @@ from .analysis.linear import LinearModel as LinearModel
 from .analysis.linear import Modes as Modes
 from .analysis.linear import closed_loop_modes as closed_loop_modes
 from .analysis.linear import linearise as linearise
+from .analysis.margins import CutLoop as CutLoop
+from .analysis.margins import Margins as Margins
+from .analysis.margins import cut_loop as cut_loop
+from .analysis.margins import held as held
+from .analysis.margins import margins as margins
 from .analysis.measures import electrical_energy as electrical_energy
 from .analysis.measures import overshoot as overshoot
 from .analysis.measures import peak as peak
@@ -46,6 +51,7 @@ from .diagnosis import diagnose as diagnose
 # Dynamics by autodiff of T - U
 from .dynamics.lagrange import coriolis_matrix as coriolis_matrix
 from .dynamics.lagrange import gravity_vector as gravity_vector
+from .dynamics.lagrange import inverse_dynamics as inverse_dynamics
 from .dynamics.lagrange import lagrangian as lagrangian
 from .dynamics.lagrange import mass_matrix as mass_matrix
 from .dynamics.one_way import OneWayLink as OneWayLink
@@ -74,8 +80,10 @@ from .ringing import MeasuredModes as MeasuredModes
 from .ringing import measure_modes as measure_modes
 from .scalars import Scalar as Scalar
 from .scalars import ScalarLike as ScalarLike
+from .scalars import optional_scalar as optional_scalar
 from .scalars import scalar as scalar
 from .sensors import Sensor as Sensor
+from .sensors import quantised as quantised
 
 # Simulation
 from .simulation.methods import AbstractMethod as AbstractMethod

@@ -25,9 +25,11 @@ class Setpoint(NamedTuple):
 class Measurement(NamedTuple):
     """What a controller may read, tuples of scalars joint by joint or link by link.
 
-    `angle` [rad], `rate` [rad/s] of the joints; `current` [A] of the motors;
-    `tip_deflection` [m] and `curvature` [1/m] at the strain gauge of the links, with
-    `curvature_rate` [1/(m s)].
+    `angle` [rad], `rate` [rad/s] of the joints; `current` [A] of the motor of every
+    joint, zero where it is no state (it then follows from the command, which may depend
+    on it); `tip_deflection` [m] of the links; `curvature` [1/m] at the strain gauge of
+    the links with `curvature_rate` [1/(m s)], and `strain` [1], `thickness / 2` times
+    that, None for a link whose thickness is not given.
     """
 
     angle: tuple
@@ -36,6 +38,7 @@ class Measurement(NamedTuple):
     tip_deflection: tuple
     curvature: tuple
     curvature_rate: tuple
+    strain: tuple
 
 
 class AbstractReference(eqx.Module):
@@ -68,14 +71,23 @@ class AbstractController(eqx.Module):
     """A control law: measurement and setpoint in, one command for every joint out.
 
     The command is a voltage [V], current [A] or torque [N m], as the arm's drive says.
-    A controller with memory keeps it in a pytree of scalars, a part of the simulated
-    state: `rate` is its time derivative, integrated by the solver under continuous
-    control and by one Euler step a sample under sampled control.
+    A controller with memory keeps it in a pytree of arrays, scalars for speed, a part of the
+    simulated state: `rate` is its time derivative, integrated by the solver under continuous
+    control; under sampled control `advance` takes it from one sample to the next. A
+    controller with a `period` is sampled wherever it is simulated.
     """
+
+    def period(self) -> Scalar | None:
+        """Time [s] from sample to sample; None for a law that is not of itself sampled."""
+        return None
 
     @abstractmethod
     def initial(self) -> PyTree:
         """Memory at the start; None for a law without memory."""
+
+    def begin(self, measurement: Measurement) -> PyTree:
+        """Memory at the start of a run whose first reading is `measurement`: `initial`, unless a law knows better."""
+        return self.initial()
 
     @abstractmethod
     def command(
@@ -86,3 +98,10 @@ class AbstractController(eqx.Module):
     @abstractmethod
     def rate(self, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint) -> PyTree:
         """Time derivative of the memory, of the same structure."""
+
+    def advance(
+        self, period: Scalar, t: Scalar, memory: PyTree, measurement: Measurement, setpoint: Setpoint
+    ) -> PyTree:
+        """Memory one sample, `period` [s], after `t`: an Euler step, unless a law knows better."""
+        slope = self.rate(t, memory, measurement, setpoint)
+        return jax.tree_util.tree_map(lambda m, s: m + period * s, memory, slope)

@@ -35,6 +35,12 @@ def initial_currents(model: AssembledArm) -> tuple[Scalar, ...]:
     return tuple(zero for i in range(len(model.joints)) if has_current_state(model, i))
 
 
+def currents_by_joint(model: AssembledArm, currents: tuple) -> tuple[Scalar, ...]:
+    """Current [A] of every joint from those that are states, zero for the others."""
+    states, zero = iter(currents), jnp.zeros_like(model.arm.payload.mass)
+    return tuple(next(states) if has_current_state(model, i) else zero for i in range(len(model.joints)))
+
+
 def drive(
     model: AssembledArm, command: tuple, currents: tuple, rates: tuple, memory: tuple | None = None
 ) -> DriveState:

@@ -216,3 +216,28 @@ def plot_history(histories: Sequence[Sequence[float]]) -> Figure:
     axes[0, 0].set_ylabel("cost (logarithmic) [1]")
     axes[0, 0].legend(frameon=False, fontsize=8)
     return figure
+
+
+def plot_pareto(
+    move_times: np.ndarray, residual: np.ndarray, efficient: np.ndarray, others: Mapping[str, np.ndarray]
+) -> Figure:
+    """Worst residual vibration [m] against move time [s]: the front, and `others` at the same move times.
+
+    Points that a shorter move matches are drawn hollow; NaN where a design is impossible in so short a time.
+    """
+    figure, axes = panels(1, 1, height=4.2, width=8.0)
+    axis = axes[0, 0]
+    for i, (name, values) in enumerate(others.items()):
+        axis.semilogy(
+            move_times, 1e3 * values, "--", color=f"C{i + 1}", linewidth=1.1, marker=".", label=name
+        )
+    axis.semilogy(move_times, 1e3 * residual, color=AFTER, linewidth=2.2, label="tuned for each move time")
+    for kept, fill in ((efficient, AFTER), (~efficient, "white")):
+        axis.semilogy(
+            move_times[kept], 1e3 * residual[kept], "o", color=AFTER, markerfacecolor=fill, linestyle="none"
+        )
+    axis.set_xlabel("move time, shaper included [s]")
+    axis.set_ylabel("worst residual tip vibration, peak to peak [mm]")
+    axis.grid(True, which="both", alpha=0.25, linewidth=0.5)
+    axis.legend(frameon=False, fontsize=8)
+    return figure

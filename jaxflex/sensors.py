@@ -113,6 +113,17 @@ def tip_accelerations(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> l
     return [tip_slopes[i].y + frames[i].rate * tips[i].x for i in range(count)]
 
 
+def quantised(signal: Float[Array, "*times"] | float, step: Scalar) -> Float[Array, "*times"]:
+    """`signal` rounded to whole multiples of `step`, as it is where that is zero.
+
+    Rounding passes the gradient through unchanged.
+    """
+    some = step > 0
+    size = jnp.where(some, step, 1.0)
+    rounded = jnp.where(some, jnp.round(signal / size) * size, signal)
+    return signal + jax.lax.stop_gradient(rounded - signal)
+
+
 class Sensor(eqx.Module):
     """An instrument with its faults: `gain * lagged(signal) + bias + noise`, then rounded.
 
@@ -140,7 +151,4 @@ class Sensor(eqx.Module):
         reading = self.gain * first_order_lag(times, signal, self.lag) + self.bias
         if key is not None:
             reading = reading + self.noise * jax.random.normal(key, signal.shape, signal.dtype)
-        if self.resolution is None:
-            return reading
-        rounded = jnp.round(reading / self.resolution) * self.resolution
-        return reading + jax.lax.stop_gradient(rounded - reading)
+        return reading if self.resolution is None else quantised(reading, self.resolution)

@@ -42,7 +42,8 @@ def designs(arm: jf.Arm, steps: int) -> dict[str, ctl.Design]:
         found[f"textbook PD, {SHAPER}"] = shaped[SHAPER]
     if steps:
         start = ctl.standard_start(problem)
-        found["tuned"] = ctl.tune(problem, start, starts=4, descents=1, max_steps=steps, seed=0).design
+        tuned = ctl.tune(problem, start, starts=4, descents=1, max_steps=steps, seed=0)
+        found["tuned"] = problem.design(tuned.values)
     return found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from controllers.minimise import make_stepper, minimise
+from controllers import Stepper, minimise
 
 from .paper import PAYLOADS, TABLE_II, measures
 from .unknowns import DURATION, WIDTH, Choice, angles, domain, printed
@@ -65,13 +65,13 @@ def search(choice: Choice, payloads, steps: int, starts: int, dt: float, seed: i
     """
     box = domain()
 
-    def cost(free):
+    def cost(free, args):
         curves = responses(choice, box.value(free), payloads, dt)
-        return jnp.log(misfit(table(curves, dt, choice.early), payloads))
+        return jnp.log(misfit(table(curves, dt, choice.early), payloads)), None
 
     centre = box.free(printed())
     scatter = jax.random.normal(jax.random.key(seed), (starts - 1, centre.shape[0]))
-    stepper = make_stepper(cost, optx.BFGS(rtol=1e-5, atol=1e-5), centre)
-    ends = [minimise(stepper, start, steps) for start in (centre, *(centre + scatter))]
+    stepper = Stepper(cost, optx.BFGS(rtol=1e-5, atol=1e-5))
+    ends = [minimise(stepper, start[None], steps)[0] for start in (centre, *(centre + scatter))]
     best = min(ends, key=lambda end: end.cost)
     return box.value(best.free)

@@ -9,11 +9,11 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex, Float
 
-from ..arm.arm import Arm
+from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference, Setpoint
 from ..scalars import Scalar, scalar
 from ..sensors import channel_names, read_channels
-from ..simulation.plant import Plant, State
+from ..simulation.plant import Plant, State, derivative
 
 
 class _Setpoint(AbstractReference):
@@ -32,6 +32,11 @@ class _Setpoint(AbstractReference):
 
     def setpoint(self, t: Scalar) -> Setpoint:
         return self.given
+
+
+def resting_reference(setpoint: Setpoint) -> AbstractReference:
+    """The reference that is `setpoint` at all times."""
+    return _Setpoint(setpoint)
 
 
 class LinearModel(NamedTuple):
@@ -62,7 +67,6 @@ class _Commands(AbstractController):
         return None
 
 
-@eqx.filter_jit
 def linearise(
     arm: Arm,
     pose: Float[Array, " joints"],
@@ -71,13 +75,29 @@ def linearise(
 ) -> LinearModel:
     """`arm` about rest at `pose` [rad], open loop or closed by `controller`.
 
-    `channels`: the outputs wanted, by name; all by default.
+    `channels`: the outputs wanted, by name; all of `simulate` by default. There are also
+    `curvature_i` [1/m] and `curvature_rate_i` [1/(m s)] at the strain gauge of link i.
 
     The arm is taken undeflected, so with gravity the result holds where its sag is
     small. Voltage limits and friction enter by their slope at rest.
+
+    **Raises** `ValueError` for a sampled controller, whose loop is no `x' = A x`:
+    `cut_loop` takes both kinds.
     """
-    joints = len(arm.joints)
-    model = arm.assemble()
+    if controller is not None and controller.period() is not None:
+        raise ValueError("linearise: the controller is sampled, so its loop is no x' = A x; use cut_loop.")
+    # the arm's constants are computed by a program of their own, compiled once for all callers
+    return _linearise(arm.assemble(), pose, controller, None if channels is None else tuple(channels))
+
+
+@eqx.filter_jit
+def _linearise(
+    model: AssembledArm,
+    pose: Float[Array, " joints"],
+    controller: AbstractController | None,
+    channels: tuple[str, ...] | None,
+) -> LinearModel:
+    joints = len(model.joints)
     closed = controller is not None
     law = controller if closed else _Commands()
     inputs = 3 * joints if closed else joints
@@ -91,10 +111,10 @@ def linearise(
         setpoint = Setpoint(value, tuple(u[joints : 2 * joints]), tuple(u[2 * joints :]))
         return Plant(model, law, _Setpoint(setpoint), None, None)
 
-    def derivative(x, u):
-        return ravel_pytree(plant(u).derivative(scalar(0.0), unflatten(x)))[0]
+    def slope(x, u):
+        return ravel_pytree(derivative(scalar(0.0), unflatten(x), plant(u)))[0]
 
-    names = channel_names(model) if channels is None else tuple(channels)
+    names = channel_names(model) if channels is None else channels
 
     def outputs(x, u):
         state: State = unflatten(x)
@@ -103,10 +123,14 @@ def linearise(
         accelerated = any(name.startswith("tip_acceleration") for name in names)
         qdd = loop.accelerations(scalar(0.0), state, drives) if accelerated else None
         found = read_channels(model, state.q, state.qd, drives, qdd)
+        reading = loop.measurement(state)
+        for i in range(len(model.arm.links)):
+            found[f"curvature_{i + 1}"] = reading.curvature[i]
+            found[f"curvature_rate_{i + 1}"] = reading.curvature_rate[i]
         return jnp.array([found[name] for name in names])
 
     zero = jnp.zeros(inputs)
-    a, b = jax.jacfwd(derivative, (0, 1))(flat, zero)
+    a, b = jax.jacfwd(slope, (0, 1))(flat, zero)
     c, d = jax.jacfwd(outputs, (0, 1))(flat, zero)
     return LinearModel(a, b, c, d, names)
 

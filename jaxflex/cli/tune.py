@@ -13,6 +13,7 @@ import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from controllers import (
+    GAINS,
     Assessment,
     Design,
     Move,
@@ -105,7 +106,8 @@ def tune(
         warm = pool.submit(compare, middle, masses, chosen, path, total, first)
         tuned = _search(problem, steps, seed)
         warm.exception()  # a first design that cannot be simulated is no reason to stop
-    comparison = compare(middle, masses, chosen, path, total, tuned.design)
+    design = problem.design(tuned.values)
+    comparison = compare(middle, masses, chosen, path, total, design)
     seconds = time.monotonic() - began
     shown = comparison_tables(comparison)
     for table in shown:
@@ -113,7 +115,7 @@ def tune(
     verdict = conclusion(comparison, tuned, middle)
     console.print(verdict)
     uncertainty = file.uncertainty if file else {}
-    save_design(folder / "tuned.toml", middle, uncertainty, tuned.design)
+    save_design(folder / "tuned.toml", middle, uncertainty, design)
     pictures = draw(comparison, tuned, chosen)
     for name, (figure, _) in pictures.items():
         figure.savefig(folder / f"{name}.png", dpi=130)
@@ -125,7 +127,7 @@ def tune(
             section("Payloads", *(picture(*pictures[name]) for name in ("before_after", "residual"))),
             section("Frequencies", picture(*pictures["spectra"])),
             section("Every design, every payload", tables(shown)),
-            section("The design", tables([design_table(tuned.design)]), picture(*pictures["history"])),
+            section("The design", tables([design_table(design)]), picture(*pictures["history"])),
         ],
     )
     result = as_json(comparison, tuned, chosen, time.monotonic() - began)
@@ -256,10 +258,10 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
     return result
 
 
-def best_classical(comparison: Comparison) -> str:
-    """The classical shaper with the tuned gains that leaves the least vibration at equal move time."""
+def best_classical(comparison: Comparison) -> str | None:
+    """The classical shaper with the tuned gains of least vibration at equal move time, if there is any."""
     names = [name for name in comparison.designs if name.endswith(", tuned PD")]
-    return min(names, key=comparison.worst)
+    return min(names, key=comparison.worst, default=None)
 
 
 def conclusion(comparison: Comparison, tuned: Tuned, arm: Arm) -> str:
@@ -274,13 +276,18 @@ def conclusion(comparison: Comparison, tuned: Tuned, arm: Arm) -> str:
     ]
     voltage = f", at {peak:.3g} V of {min(limits):g} V" if limits else ""
     steps = sum(minimum.steps for minimum in tuned.minima)
+    against = (
+        "no mode rings under the tuned gains, so there is no classical shaper to compare with"
+        if rival is None
+        else f"{1e3 * comparison.worst(rival):.3g} mm for the best classical shaper with the tuned gains at "
+        f"equal time, {rival.split(',')[0]} ({comparison.worst(rival) / ours:.3g} times as much)"
+    )
     return (
         f"Worst residual vibration over payloads never tuned on: {1e3 * ours:.3g} mm for the tuned design"
         f"{voltage}; {1e3 * comparison.worst(UNTUNED):.3g} mm for the untuned PD "
         f"({comparison.worst(UNTUNED) / ours:.3g} times as much), "
         f"{1e3 * comparison.worst(STRETCHED):.3g} mm with its move stretched to equal time, and "
-        f"{1e3 * comparison.worst(rival):.3g} mm for the best classical shaper with the tuned gains at "
-        f"equal time, {rival.split(',')[0]} ({comparison.worst(rival) / ours:.3g} times as much). "
+        f"{against}. "
         f"The search took {steps} steps and {tuned.minima[0].reason}."
     )
 
@@ -288,11 +295,15 @@ def conclusion(comparison: Comparison, tuned: Tuned, arm: Arm) -> str:
 def design_table(design: Design) -> Table:
     """The parameters of a design."""
     table = Table("parameters of the tuned design", ["parameter", "unit", "values"])
-    rows = [
-        ("stiffness gain", "V/rad", design.controller.stiffness),
-        ("damping gain", "V s/rad", design.controller.damping),
-        ("rate feedforward", "V s/rad", design.controller.rate_feedforward),
-        ("acceleration feedforward", "V s²/rad", design.controller.acceleration_feedforward),
+    titles = (
+        ("stiffness gain", "V/rad"),
+        ("damping gain", "V s/rad"),
+        ("rate feedforward", "V s/rad"),
+        ("acceleration feedforward", "V s²/rad"),
+    )
+    gains = [getattr(design.controller, name) for name in GAINS]
+    rows = [(*title, values) for title, values in zip(titles, gains, strict=True)]
+    rows += [
         ("shaper amplitudes", "1", design.shaper.amplitudes),
         ("shaper delays", "s", design.shaper.delays),
     ]
@@ -366,7 +377,9 @@ def as_json(comparison: Comparison, tuned: Tuned, masses: list[float], seconds: 
         "untuned": UNTUNED,
         "best_classical": rival,
         "tuned_on": masses,
-        "worst_held_out_m": {n: comparison.worst(n) for n in (TUNED, UNTUNED, STRETCHED, rival)},
+        "worst_held_out_m": {
+            n: comparison.worst(n) for n in (TUNED, UNTUNED, STRETCHED, rival) if n is not None
+        },
         "parameters": {name: np.asarray(value).tolist() for name, value in tuned.values.items()},
         "history": [minimum.history for minimum in tuned.minima],
         "stopped": [minimum.reason for minimum in tuned.minima],

@@ -77,3 +77,19 @@ def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tup
     slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
     right = tuple(f - d + s for f, d, s in zip(force, drift, slope, strict=True))
     return solve(lower, right)
+
+
+def inverse_dynamics(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tuple[Scalar, ...]:
+    """`M q'' + C q' + g + D q'`: the force on every coordinate that makes this motion.
+
+    [N m] on the joints, [N] on the deflections, where a motion that is possible without
+    other forces has none. From the Lagrangian: `d/dt(dL/dq') - dL/dq + D q'`.
+    """
+
+    def momentum(q, qd):
+        return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
+
+    slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
+    change = jax.jvp(momentum, (q, qd), (qd, qdd))[1]
+    damped = map(lambda d, v: d * v, model.damping(), qd)
+    return tuple(c - s + d for c, s, d in zip(change, slope, damped, strict=True))

@@ -11,6 +11,7 @@ from ..arm.arm import AssembledArm
 from ..control import AbstractController, AbstractReference, Measurement
 from ..drive import (
     DriveState,
+    currents_by_joint,
     drive,
     drive_memory_rates,
     effect_torques,
@@ -54,29 +55,30 @@ class Plant(eqx.Module):
         zero = jnp.zeros_like(angles[0])
         q = angles + (zero,) * (self.model.size - len(angles))
         held = None if self.sample_time is None else (zero,) * len(angles)
-        return State(
-            q,
-            (zero,) * len(q),
-            initial_currents(self.model) or None,
-            self.controller.initial(),
-            held,
-            initial_drive_memory(self.model),
-        )
+        currents, drives = initial_currents(self.model) or None, initial_drive_memory(self.model)
+        return self.begun(State(q, (zero,) * len(q), currents, None, held, drives))
+
+    def begun(self, state: State) -> State:
+        """`state` with the memory that the controller starts with there."""
+        return state._replace(memory=self.controller.begin(self.measurement(state)))
 
     def measurement(self, state: State) -> Measurement:
         """What the controller reads of `state`, without error or delay."""
         angles, etas = self.model.split(state.q)
         rates, eta_rates = self.model.split(state.qd)
         links = self.model.links
-        # A current that is no state depends on the command, which may depend on it: it reads zero.
-        currents = state.current or (jnp.zeros_like(angles[0]),) * len(angles)
+        curvatures = tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, etas))
+        thicknesses = tuple(link.thickness for link in self.model.arm.links)
         return Measurement(
             angle=angles,
             rate=rates,
-            current=currents,
+            current=currents_by_joint(self.model, state.current or ()),
             tip_deflection=tuple(map(measured_deflection, links, etas)),
-            curvature=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, etas)),
+            curvature=curvatures,
             curvature_rate=tuple(map(lambda m, e: dot(m.gauge_curvature, e), links, eta_rates)),
+            strain=tuple(
+                None if h is None else h / 2 * c for h, c in zip(thicknesses, curvatures, strict=False)
+            ),
         )
 
     def command(self, t: Scalar, state: State) -> tuple:
@@ -125,8 +127,8 @@ class Plant(eqx.Module):
         setpoint = self.reference.setpoint(t)
         measurement = self.measurement(state)
         held = self.controller.command(t, state.memory, measurement, setpoint)
-        slope = self.controller.rate(t, state.memory, measurement, setpoint)
-        memory = jtu.tree_map(lambda m, s: m + self.sample_time * s, state.memory, slope)
+        assert self.sample_time is not None
+        memory = self.controller.advance(self.sample_time, t, state.memory, measurement, setpoint)
         return state._replace(memory=memory, held=held)
 
 

@@ -60,7 +60,7 @@ def simulate(
     - `initial`: an `InitialState`; by default at rest, all angles zero.
     - `disturbance`: torques [N m] on the joints beside the motors.
     - `sample_time` [s]: the controller computes a command this often and holds it in
-      between; None for continuous control.
+      between; None for the controller's own `period`, or continuous control if it has none.
     - `method`: `Adaptive(rtol, atol, solver)` (default, 1e-6) or `Fixed(dt, solver)`.
       Either steps to every jump of reference and disturbance and to every sample.
     - `channels`: names of those wanted; all by default. Fewer compile faster.
@@ -75,7 +75,8 @@ def simulate(
     (outside of `jit` and `vmap`); `ValueError` for times or references that do not fit.
     """
     model = arm.assemble()
-    plant = Plant(model, controller, reference, disturbance, optional_scalar(sample_time))
+    period = _period(controller, optional_scalar(sample_time))
+    plant = Plant(model, controller, reference, disturbance, period)
     times = jnp.asarray(times, dtype=jnp.result_type(float))
     if times.shape[0] < 2:
         raise ValueError(f"simulate needs at least two times, found {times.shape[0]}.")
@@ -89,6 +90,18 @@ def simulate(
     if any(isinstance(leaf, Tracer) for leaf in jtu.tree_leaves(inputs)):
         return _integrate(*inputs)
     return eqx.filter_jit(_integrate)(*inputs).check()
+
+
+def _period(controller: AbstractController, asked: Scalar | None) -> Scalar | None:
+    own = controller.period()
+    if own is None or asked is None:
+        return asked if own is None else own
+    if not (isinstance(own, Tracer) or isinstance(asked, Tracer)) and own != asked:
+        raise ValueError(
+            f"sample_time = {float(asked):g} s, but the controller was made for {float(own):g} s: "
+            "leave sample_time out, or make the controller for that period."
+        )
+    return own
 
 
 def _check_joints(plant: Plant, signal: AbstractReference, what: str) -> None:
@@ -129,7 +142,7 @@ def initial_state(plant: Plant, initial: InitialState) -> State:
     qd = scalars(initial.rates, joints, "rates") + scalars(
         initial.deflection_rates, shapes, "deflection_rates"
     )
-    return rest._replace(q=q, qd=qd)
+    return plant.begun(rest._replace(q=q, qd=qd))
 
 
 def has_diverged(model: AssembledArm, q: tuple) -> Array:

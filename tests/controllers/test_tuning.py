@@ -1,30 +1,40 @@
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 import optimistix as optx
 import pytest
 
 import jaxflex as jf
 from controllers import (
+    PD,
+    AbstractProblem,
     Delays,
+    Freely,
     Interval,
+    Limits,
     Move,
+    NoRinging,
+    Outcome,
     Positive,
     Problem,
     Simplex,
     assess,
     classical_designs,
-    cost,
     default_move,
+    pareto_front,
     ringing_mode,
     stack,
     standard_start,
     textbook_pd,
     tune,
     unshaped_design,
-    with_payloads,
+    varied,
 )
-from controllers.minimise import make_stepper, minimise, with_gradient
+from controllers.minimise import Stepper, minimise, with_gradient
+from controllers.pareto import at_pace
+from jaxflex import margins
 
 
 @pytest.mark.parametrize(
@@ -89,21 +99,25 @@ def test_designs_last_equally_long(problem):
 
 
 def test_gradient_of_the_cost_matches_finite_differences(problem):
-    free = problem.free(standard_start(problem))
+    first = standard_start(problem)
+    free = problem.free(first)
 
-    def of_free(x):
-        return cost(problem, problem.values(x))
+    def of_free(x, args):
+        found = problem.outcome(problem.values(x, first))
+        return found.cost, found.excess
 
-    value, slope = jax.jit(jax.value_and_grad(with_gradient(of_free)))(free)
-    f = jax.jit(of_free)
+    judged = with_gradient(of_free)
+    (value, excess), slope = jax.jit(jax.value_and_grad(lambda x: judged(x, None), has_aux=True))(free)
+    f = jax.jit(lambda x: of_free(x, None)[0])
     np.testing.assert_allclose(f(free), value, rtol=1e-6)
+    assert set(excess) == {"voltage_1", "deflection_1"}
     direction = jnp.asarray(np.random.default_rng(0).normal(size=free.shape))
     h = 1e-3
     difference = (f(free + h * direction) - f(free - h * direction)) / (2 * h)
     np.testing.assert_allclose(slope @ direction, difference, rtol=2e-2)
 
 
-def test_tuning_beats_the_textbook_on_payloads_it_never_saw(problem):
+def test_tuning_beats_the_textbook_on_arms_it_never_saw(problem):
     seen = []
     tuned = tune(
         problem,
@@ -116,28 +130,138 @@ def test_tuning_beats_the_textbook_on_payloads_it_never_saw(problem):
     minimum = tuned.minima[0]
     assert minimum.history[-1] < minimum.history[0] - 1.0 and minimum.steps == len(minimum.history)
     assert "converged" in minimum.reason and {what for what, _, _ in seen} == {"starts", "descent 1"}
+    assert tuned.evaluations == 3 + minimum.steps and tuned.measures["residual_vibration"].shape == (2,)
     total = float(problem.total_time())
     untuned = unshaped_design(textbook_pd(problem.arm, jnp.stack(problem.move.stop)), problem.move, total)
     times = jnp.linspace(0.0, total + 0.3, 401)
-    held_out = with_payloads(problem.arm, jnp.array([0.01, 0.03]))
-    measures, runs = assess(stack([untuned, tuned.design]), held_out, times)
+    # payloads between those tuned on, stiffness and damping that were not varied at all
+    held_out = varied(
+        problem.arm, jnp.array([0.01, 0.03, 0.02, 0.02]), jnp.array([1.0, 1.0, 0.95, 1.05]),
+        jnp.array([1.0, 1.0, 0.5, 2.0]),
+    )  # fmt: skip
+    measures, runs = assess(stack([untuned, problem.design(tuned.values)]), held_out, times)
     runs.check()
-    worst = np.asarray(measures.residual_vibration).max(axis=1)
-    assert worst[1] < worst[0] / 4
+    residual = np.asarray(measures.residual_vibration)
+    assert residual[1, :2].max() < residual[0, :2].max() / 4
+    assert residual[1].max() < residual[0].max() / 2
     assert np.asarray(measures.peak_voltage).max() <= 24.0 + 1e-9
     assert np.asarray(measures.deflection)[1].max() < 0.13
 
 
-def test_a_failing_simulation_costs_infinity_and_is_no_gradient_of_nan():
-    def cliff(x):
-        return jnp.where(x[0] > 2.0, jnp.inf, (x[0] - 1.9) ** 2 + x[1] ** 2)
+class Bowl(AbstractProblem):
+    """Least at (3, 1) without its constraint, and known in closed form with it."""
 
-    stepper = make_stepper(cliff, optx.BFGS(rtol=1e-8, atol=1e-8), jnp.zeros(2))
-    found = minimise(stepper, jnp.array([0.0, 5.0]), 60)
+    weight: jax.Array
+
+    def domains(self):
+        return {"a": Positive(), "b": Positive()}
+
+    def outcome(self, values):
+        a, b = values["a"], values["b"]["deep"][0]
+        cost = self.weight * (a - 3.0) ** 2 + (b - 1.0) ** 2
+        return Outcome(cost, {"sum": (a + b - 2.0)[None]}, {"a": a})
+
+
+START = {"a": jnp.array(1.0), "b": {"deep": [jnp.array(0.5)]}}
+
+
+@pytest.mark.parametrize("together", [1, 3])
+def test_constraints_are_met_by_the_augmented_lagrangian(together):
+    # on a + b = 2 the least of w (a-3)^2 + (b-1)^2 is at a = (1 + 3 w) / (1 + w)... within b > 0
+    weight = 0.5
+    tuned = tune(
+        Bowl(jnp.array(weight)), START, starts=3, descents=3, max_steps=120, rounds=6, penalty=2.0,
+        together=together,
+    )  # fmt: skip
+    a = (1 + 3 * weight) / (1 + weight)
+    np.testing.assert_allclose(tuned.values["a"], a, rtol=5e-3)
+    np.testing.assert_allclose(tuned.values["b"]["deep"][0], 2 - a, rtol=2e-2)
+    assert tuned.excess < 1e-2 and len(tuned.minima) == 3
+    np.testing.assert_allclose(tuned.cost, weight * (a - 3) ** 2 + (1 - a) ** 2, rtol=2e-2)
+    # one round is a penalty: it gives way
+    soft = tune(Bowl(jnp.array(weight)), START, starts=1, descents=1, max_steps=60, penalty=2.0)
+    assert soft.excess > 0.05
+
+
+def test_a_second_problem_of_the_same_kind_does_not_compile_again():
+    traces = []
+
+    class Counted(AbstractProblem):
+        target: jax.Array
+
+        def domains(self):
+            return Positive()
+
+        def outcome(self, values):
+            traces.append(1)
+            return Outcome(jnp.sum((values - self.target) ** 2))
+
+    for target in (1.5, 2.5):
+        tuned = tune(Counted(jnp.array([target])), jnp.array([1.0]), starts=2, descents=1)
+        np.testing.assert_allclose(tuned.values, target, rtol=1e-3)
+        if target == 1.5:
+            seen = len(traces)
+    assert len(traces) - seen <= 1  # the shape of its outcome is asked once, nothing is compiled
+
+
+def test_any_parameters_any_objective(problem):
+    # the textbook PD itself as the pytree, its gains all positive, judged by the margins of its loop
+    pd = textbook_pd(problem.arm, jnp.stack(problem.move.stop))
+
+    def judge(gains):
+        found = margins(problem.arm, jnp.stack(problem.move.stop), gains)
+        return Outcome(-found.decay, {"modulus": 0.5 / found.modulus - 1})
+
+    pd = PD(pd.stiffness, (0.05,), (1e-3,), (1e-3,))
+    tuned = tune(Freely(judge, Positive()), pd, starts=1, descents=1, max_steps=60, rounds=3, penalty=10.0)
+    before, after = (margins(problem.arm, jnp.stack(problem.move.stop), g) for g in (pd, tuned.values))
+    assert isinstance(tuned.values, PD)
+    assert after.decay > before.decay and after.modulus[0] > 0.49
+
+
+def test_margins_are_hard_constraints_of_the_task(problem):
+    first = standard_start(problem)
+    limited = Problem(
+        problem.arm, problem.payloads, problem.move, problem.start, 0.09, watch=0.3, samples=61, impulses=4,
+        limits=Limits(current=3.0, move_time=1.0, phase=0.5, modulus=0.6),
+    )  # fmt: skip
+    excess = eqx.filter_jit(limited.outcome)(first).excess
+    assert set(excess) == {
+        "voltage_1", "current_1", "deflection_1", "decay", "phase", "modulus", "move_time",
+    }  # fmt: skip
+    for payload, found in zip(limited.payloads, excess["modulus"], strict=True):
+        design = limited.design(first)
+        arm = limited.arm.with_payload(payload)
+        expected = margins(arm, jnp.stack(design.move.stop), design.controller)
+        np.testing.assert_allclose(found[0], 0.6 / expected.modulus[0] - 1, rtol=1e-6)
+    np.testing.assert_allclose(excess["move_time"], limited.total_time() / 1.0 - 1, rtol=1e-9)
+
+
+def cliff(x, args):
+    return jnp.where(x[0] > 2.0, jnp.inf, (x[0] - 1.9) ** 2 + x[1] ** 2), x[0]
+
+
+def test_a_failing_simulation_costs_infinity_and_is_no_gradient_of_nan():
+    stepper = Stepper(cliff, optx.BFGS(rtol=1e-8, atol=1e-8))
+    found, other = minimise(stepper, jnp.array([[0.0, 5.0], [1.0, 1.0]]), 60)
     np.testing.assert_allclose(found.free, [1.9, 0.0], atol=1e-3)
-    assert found.reason == "converged"
-    short = minimise(stepper, jnp.array([0.0, 5.0]), 2)
+    np.testing.assert_allclose(found.aux, found.free[0])
+    assert found.reason == other.reason == "converged"
+    (short,) = minimise(stepper, jnp.array([[0.0, 5.0]]), 2)
     assert "2 steps allowed, not converged" in short.reason
+
+
+def test_minimisers_of_optax_serve_as_well():
+    def bowl(x, args):
+        return (x[0] - 1.9) ** 2 + x[1] ** 2, x[0]
+
+    stepper = Stepper(bowl, optx.OptaxMinimiser(optax.adam(0.1), rtol=1e-6, atol=1e-6))
+    (found,) = minimise(stepper, jnp.array([[0.5, 2.0]]), 400)
+    np.testing.assert_allclose(found.free, [1.9, 0.0], atol=2e-2)
+    # the cost is that of the point, not of the one before or after it
+    np.testing.assert_allclose([found.cost, found.aux], [bowl(found.free, None)[0], found.free[0]], rtol=1e-9)
+    with pytest.raises(TypeError, match="does not say what its points cost"):
+        minimise(Stepper(bowl, optx.NelderMead(1e-6, 1e-6)), jnp.array([[0.5, 2.0]]), 5)
 
 
 def test_no_start_that_can_be_simulated_is_an_error(problem):
@@ -147,3 +271,23 @@ def test_no_start_that_can_be_simulated_is_an_error(problem):
     )  # fmt: skip
     with pytest.raises(RuntimeError, match="no start of the tuning could be simulated"):
         tune(hopeless, standard_start(hopeless), starts=1, max_steps=1)
+
+
+def test_no_ringing_leaves_the_classical_designs_out():
+    rigid = jf.Arm((), (jf.Joint(hub_inertia=1.0, viscous_friction=3.0),))
+    gains = PD((1.0,), (0.1,))
+    with pytest.raises(NoRinging, match="nothing to cancel"):
+        ringing_mode(rigid, jnp.zeros(1), gains)
+    assert classical_designs(rigid, gains, Move((0.0,), (1.0,), 1.0), 2.0) == {}
+
+
+def test_slower_moves_leave_less_vibration(problem):
+    total = float(problem.total_time())
+    front = pareto_front(problem, np.array([total, 0.8 * total]), starts=1, descents=1, max_steps=12)
+    assert np.all(np.diff(front.move_time) > 0) and front.residual_vibration[1] < front.residual_vibration[0]
+    assert front.efficient.tolist() == [True, True]
+    designs = [
+        at_pace(problem, float(t) / total).design(x.values)
+        for t, x in zip(front.move_time, front.tuned, strict=True)
+    ]
+    np.testing.assert_allclose([d.move_time() for d in designs], front.move_time, rtol=1e-9)

@@ -1,0 +1,1 @@
+"""Residual vibration against move time, and how a tuned design fares on arms it was not tuned on."""
