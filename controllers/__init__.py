@@ -71,6 +71,7 @@ from .riccati import solve_dare as solve_dare
 from .lqg import LQG as LQG
 from .lqg import lqg as lqg
 from .learning import Learned as Learned
+from .learning import LearningGain as LearningGain
 from .learning import Replayed as Replayed
 from .learning import impulse_response as impulse_response
 from .learning import learn as learn

@@ -1,11 +1,18 @@
 """Iterative learning of a feedforward: the same move again and again, each time better.
 
 A move of N samples is one vector. Of the linear loop, the errors of the joints are
-`e = e_0 - G f` with f the feedforward and G its impulse response, lower triangular. Each
-trial adds `L e` to f, with `L = (G'G + lambda I)^-1 G'` (norm-optimal learning, Amann,
-Owens and Rogers 1996): `e_j+1 = (I - G L) e_j`, whose eigenvalues
-`lambda / (lambda + sigma^2)` lie below 1 for every singular value sigma of G, so that
-every trial of the linear loop is better than the one before.
+`e = e_0 - G f` with f the feedforward and G its impulse response, lower triangular. The
+next trial's f is the least of `|e - G (f' - f)|^2 + lambda |f' - f|^2 + mu |f'|^2` with
+respect to f' (norm-optimal learning, Amann, Owens and Rogers 1996; with a weight on the
+command itself as in Gunnarsson and Norrlof 2001): `f' = Q f + L e`, where
+
+    L = (G'G + (lambda + mu) I)^-1 G'      Q = (G'G + (lambda + mu) I)^-1 (G'G + lambda I)
+
+On an arm whose response is G, f comes closer to where it settles by
+`lambda / (lambda + mu + sigma^2)` a trial for every singular value sigma of G. On one whose
+response is H, trials settle if every eigenvalue of `Q - L H` lies within the unit circle:
+with mu zero that fails as soon as G and H part by a quarter turn or more at some
+frequency, as they do between a resonance and where the model puts it.
 """
 
 from typing import NamedTuple
@@ -88,11 +95,26 @@ def impulse_response(
     return blocks.transpose(0, 2, 1, 3).reshape(samples * joints, samples * joints)
 
 
-def learning_gain(response: Float[Array, "errors commands"], caution: ScalarLike) -> Array:
-    """`L = (G'G + lambda I)^-1 G'`, with `sqrt(lambda)` the share `caution` of G's largest singular value."""
-    size = scalar(caution) * jnp.linalg.norm(response, 2)
-    gram = response.T @ response
-    return jnp.linalg.solve(gram + size**2 * jnp.eye(gram.shape[0]), response.T)
+class LearningGain(NamedTuple):
+    """What a trial teaches: the next feedforward is `memory f + correction e`."""
+
+    correction: Float[Array, "commands errors"]
+    memory: Float[Array, "commands commands"]
+
+
+def learning_gain(
+    response: Float[Array, "errors commands"], caution: ScalarLike, forgetting: ScalarLike = 0.0
+) -> LearningGain:
+    """L and Q, with `sqrt(lambda)` the share `caution` of G's largest singular value, and mu `forgetting` lambda.
+
+    Without forgetting every trial of the very arm of `response` is better than the one
+    before. Of an arm that is only like it, errors fall at first and may creep up again;
+    0.3 or so holds them down, at the price of a small error that stays.
+    """
+    scale = (scalar(caution) * jnp.linalg.norm(response, 2)) ** 2
+    gram, unit = response.T @ response, jnp.eye(response.shape[1])
+    weighed = gram + (1 + scalar(forgetting)) * scale * unit
+    return LearningGain(jnp.linalg.solve(weighed, response.T), jnp.linalg.solve(weighed, gram + scale * unit))
 
 
 class Learned(NamedTuple):
@@ -106,7 +128,7 @@ def learn(
     arm: Arm,
     controller: AbstractController,
     reference: AbstractReference,
-    gain: Float[Array, "commands errors"],
+    gain: LearningGain,
     interval: ScalarLike,
     trials: int = 8,
     method: AbstractMethod | None = None,
@@ -114,15 +136,14 @@ def learn(
     """Run the move `trials` times on `arm`, its feedforward better each time.
 
     `gain` is the `learning_gain` of a model; `arm` is the one that learns, and need not
-    be that model. Where they differ, errors fall at first and may creep up again after
-    some trials, at frequencies where the model is wrong by a quarter turn or more: hence
-    the best trial is the one kept. The arm begins each trial at rest where the reference begins.
+    be that model. The best trial is the one kept. The arm begins each trial at rest where
+    the reference begins.
 
     **Raises** `SimulationError` if a trial fails, as when model and arm differ so much
     that learning diverges.
     """
     joints = len(arm.joints)
-    samples = gain.shape[0] // joints
+    samples = gain.correction.shape[0] // joints
     times = scalar(interval) * jnp.arange(samples + 1)
     start = InitialState(angles=jnp.stack(reference(times[0])))
     wanted = jnp.stack(jax.vmap(reference)(times), axis=-1)
@@ -133,7 +154,8 @@ def learn(
         law = ZeroOrderHold(Sum((controller, Replayed(table, interval))), interval)
         run = simulate(arm, law, reference, times, initial=start, method=method, channels=names)
         error = (wanted - jnp.stack([run[name] for name in names], axis=-1))[1:]
-        return run, error, table + (gain @ error.ravel()).reshape(table.shape)
+        after = gain.memory @ table.ravel() + gain.correction @ error.ravel()
+        return run, error, after.reshape(table.shape)
 
     table, errors = jnp.zeros((samples, joints)), []
     best = table

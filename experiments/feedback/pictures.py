@@ -10,8 +10,8 @@ import jaxflex as jf
 from ..pictures import figure
 
 
-def responses(runs: Mapping[str, jf.Trajectory], errors: np.ndarray, end: float) -> Figure:
-    """Deflections of the continuous laws on the left, learning on the right."""
+def responses(runs: Mapping[str, jf.Trajectory], errors: Mapping[str, np.ndarray], end: float) -> Figure:
+    """Deflections of the continuous laws on the left, errors [mrad] of the trials on the right."""
     made, axes = figure(1, 2, height=4.0, width=11.0)
     left, right = axes[0]
     for i, (name, run) in enumerate(runs.items()):
@@ -26,7 +26,9 @@ def responses(runs: Mapping[str, jf.Trajectory], errors: np.ndarray, end: float)
     left.set_xlabel("time [s] (dotted: end of the move)")
     left.set_ylabel("tip deflection [mm]")
     left.legend(frameon=False, fontsize=7)
-    right.semilogy(np.arange(1, len(errors) + 1), 1e3 * errors, "o-", color="C0")
+    for name, row in errors.items():
+        right.semilogy(np.arange(1, len(row) + 1), row, "o-", label=name)
+    right.legend(frameon=False, fontsize=7)
     right.set_xlabel("trial")
     right.set_ylabel("rms error of the joint [mrad]")
     right.set_title("PD with a learnt feedforward", fontsize=9)

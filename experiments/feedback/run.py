@@ -43,7 +43,11 @@ def run(folder: Path, reduced: bool) -> dict:
     held = ctl.ZeroOrderHold(theory["PD"], interval)
     model = jf.foldager_link(0.0, modes=1, hub_inertia=HUB)  # the payload is not known to it
     response = ctl.impulse_response(model, jnp.stack(MOVE.stop), held, 250)
-    learned = ctl.learn(arm, held, MOVE, ctl.learning_gain(response, 0.05), interval, trials)
-    figures["learning"] = {"rms_joint_error_mrad": (1e3 * learned.errors).tolist()}
-    pictures.responses(runs, learned.errors, float(MOVE.duration)).savefig(folder / "feedback.png", dpi=130)
+    errors = {}
+    for forgetting in (0.0, 0.3):
+        gain = ctl.learning_gain(response, 0.1, forgetting)
+        learned = ctl.learn(arm, held, MOVE, gain, interval, trials)
+        errors[f"forgetting {forgetting:g}"] = 1e3 * learned.errors
+    figures["learning_rms_joint_error_mrad"] = {name: row.tolist() for name, row in errors.items()}
+    pictures.responses(runs, errors, float(MOVE.duration)).savefig(folder / "feedback.png", dpi=130)
     return figures

@@ -112,7 +112,8 @@ def test_learning_converges_as_the_linear_theory_says():
     times = period * jnp.arange(samples + 1)
     run = jf.simulate(arm, law, move, times, method=jf.Adaptive(rtol=1e-10, atol=1e-12))
     error = np.asarray(run["reference_1"] - run["angle_1"])[1:]
-    contraction = np.eye(samples) - np.asarray(response @ gain)
+    np.testing.assert_allclose(gain.memory, np.eye(samples), atol=1e-9)  # nothing is forgotten
+    contraction = np.eye(samples) - np.asarray(response @ gain.correction)
     assert np.linalg.norm(contraction, 2) < 1
     for measured in found.errors:
         np.testing.assert_allclose(measured, np.sqrt(np.mean(error**2)), rtol=1e-4, atol=1e-9)
@@ -141,6 +142,37 @@ def test_learning_carries_over_to_a_flexible_arm_of_another_payload():
     gain = learning_gain(impulse_response(arm, jnp.zeros(1), law, 60), 0.05)
     found = learn(arm.with_payload(0.03), law, move, gain, period, 5)
     assert np.all(np.diff(found.errors) < 0) and found.errors[-1] < found.errors[0] / 5
+
+
+def test_forgetting_keeps_trials_from_creeping_up_where_the_model_is_wrong():
+    period, samples, pose = 5e-3, 100, jnp.zeros(1)
+    law = ZeroOrderHold(PD((10.0,), (0.3,)), period)
+    model, arm = (
+        np.asarray(impulse_response(jf.foldager_link(mass, modes=1), pose, law, samples))
+        for mass in (0.0, 0.02)
+    )
+    wanted = np.linspace(0.0, 1.0, samples) ** 2
+
+    def repeated(forgetting, response, trials):
+        gain = learning_gain(jnp.asarray(model), 0.05, forgetting)
+        feedforward, errors = np.zeros(samples), []
+        for _ in range(trials):
+            error = wanted - response @ feedforward
+            errors.append(np.linalg.norm(error))
+            feedforward = np.asarray(gain.memory @ feedforward + gain.correction @ error)
+        return feedforward, np.array(errors)
+
+    _, creeping = repeated(0.0, arm, 40)
+    _, settled = repeated(0.3, arm, 40)
+    assert creeping[-1] > 10 * creeping.min()
+    assert settled[-1] < 1.1 * settled.min() < settled[0] / 50
+    # the price, on the very arm of the model: trials settle where |e|^2 + mu |f|^2 is least
+    found, _ = repeated(0.3, model, 200)
+    weight = np.sqrt(0.3) * 0.05 * np.linalg.norm(model, 2)
+    least, *_ = np.linalg.lstsq(
+        np.vstack([model, weight * np.eye(samples)]), np.concatenate([wanted, np.zeros(samples)])
+    )
+    np.testing.assert_allclose(found, least, atol=1e-9 * np.abs(least).max())
 
 
 def test_derivatives_through_computed_torque():

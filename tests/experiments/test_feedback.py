@@ -23,4 +23,5 @@ def test_a_drive_with_an_encoder_does_nearly_as_well(figures):
 
 
 def test_learning_goes_down(figures):
-    assert np.all(np.diff(figures["learning"]["rms_joint_error_mrad"]) < 0)
+    for errors in figures["learning_rms_joint_error_mrad"].values():
+        assert np.all(np.diff(errors) < 0)
