@@ -21,7 +21,7 @@ def solve(matrix: list[list[Scalar]], right: tuple) -> tuple[Scalar, ...]:
         half = jnp.linalg.solve(factor, jnp.stack(right))
         return tuple(jnp.linalg.solve(factor.T, half))
     factor = [[None] * n for _ in range(n)]
-    pivots: list = []
+    inverses: list = []  # of the pivots: multiplying costs a fraction of dividing
     for i in range(n):
         scaled = []
         for j in range(i):
@@ -29,16 +29,16 @@ def solve(matrix: list[list[Scalar]], right: tuple) -> tuple[Scalar, ...]:
             for k in range(j):
                 value = value - scaled[k] * factor[j][k]
             scaled.append(value)
-            factor[i][j] = value / pivots[j]
+            factor[i][j] = value * inverses[j]
         pivot = matrix[i][i]
         for k in range(i):
             pivot = pivot - scaled[k] * factor[i][k]
-        pivots.append(pivot)
+        inverses.append(1 / pivot)
     x = list(right)
     for i in range(n):
         for k in range(i):
             x[i] = x[i] - factor[i][k] * x[k]
-    x = [value / pivot for value, pivot in zip(x, pivots, strict=True)]
+    x = [value * inverse for value, inverse in zip(x, inverses, strict=True)]
     for i in reversed(range(n)):
         for k in range(i + 1, n):
             x[i] = x[i] - factor[k][i] * x[k]
