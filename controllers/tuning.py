@@ -18,8 +18,8 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from jaxflex import (
-    Adaptive,
     Arm,
+    Fixed,
     Scalar,
     residual_vibration,
     scalar,
@@ -153,8 +153,7 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
             design,
             arm,
             times,
-            # stability, not accuracy, sets the step here: a solver of few stages is the cheaper
-            method=Adaptive(rtol=1e-5, atol=1e-7, solver=diffrax.Bosh3(), stability=None),
+            method=Fixed(None),  # stability, not accuracy, sets the step here
             channels=wanted,
             max_steps=50_000,
             adjoint=diffrax.ForwardMode(),

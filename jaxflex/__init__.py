@@ -74,6 +74,9 @@ from .scalars import ScalarLike as ScalarLike
 from .scalars import scalar as scalar
 from .sensors import Sensor as Sensor
 
+# What to call first in a notebook
+from .session import set_up as set_up
+
 # Simulation
 from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive
@@ -83,3 +86,4 @@ from .simulation.simulate import InitialState as InitialState
 from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import SimulationError as SimulationError
 from .simulation.trajectory import Trajectory as Trajectory
+from .sweep import sweep as sweep
