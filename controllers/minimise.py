@@ -11,7 +11,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from jaxflex import Scalar
+from jaxflex import Scalar, value_and_gradient
 
 Free = Float[Array, " free"]
 
@@ -31,7 +31,7 @@ class Minimum(NamedTuple):
 
 
 def with_gradient(cost: Callable[[Free], Scalar]) -> Callable[[Free], Scalar]:
-    """`cost`, whose derivative is computed together with it, forwards, all parameters at once.
+    """`cost`, whose derivative is computed together with it, in the mode that suits their number.
 
     A minimiser that linearises its function then runs the simulation once a step.
     """
@@ -42,11 +42,7 @@ def with_gradient(cost: Callable[[Free], Scalar]) -> Callable[[Free], Scalar]:
 
     @call.defjvp
     def _(primals, tangents):
-        def twice(x):
-            value = cost(x)
-            return value, value
-
-        gradient, value = jax.jacfwd(twice, has_aux=True)(primals[0])
+        value, gradient = value_and_gradient(cost)(primals[0])
         return value, jnp.dot(gradient, tangents[0])
 
     return call

@@ -9,7 +9,6 @@ move time is kept by construction, since the delays of the shaper end where they
 from collections.abc import Callable
 from typing import NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,6 +20,7 @@ from jaxflex import (
     Arm,
     Fixed,
     Scalar,
+    adjoint_for,
     residual_vibration,
     scalar,
     tip_position,
@@ -156,7 +156,7 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
             method=Fixed(None),  # stability, not accuracy, sets the step here
             channels=wanted,
             max_steps=50_000,
-            adjoint=diffrax.ForwardMode(),
+            adjoint=adjoint_for(sum(value.size for value in values.values())),
         )
         late = trajectory.tip[problem.samples - 1 :]
         excursion = residual_vibration(after, late, end, target)

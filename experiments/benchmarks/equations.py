@@ -14,7 +14,7 @@ from jax.extend import core
 
 import jaxflex as jf
 
-UNARY = {"sin": sp.sin, "cos": sp.cos, "neg": lambda x: -x, "copy": lambda x: x}
+UNARY = {"neg": lambda x: -x, "copy": lambda x: x}
 BINARY = {
     "add": lambda x, y: x + y,
     "add_any": lambda x, y: x + y,
@@ -41,6 +41,8 @@ def replay(program: core.Jaxpr, constants: list, inputs: list) -> list:
             results = [UNARY[name](*operands)]
         elif name in BINARY:
             results = [BINARY[name](*operands)]
+        elif name == "sin_cos":
+            results = [sp.sin(*operands), sp.cos(*operands)]
         elif name == "integer_pow":
             results = [operands[0] ** equation.params["y"]]
         elif name in ("convert_element_type", "broadcast_in_dim"):

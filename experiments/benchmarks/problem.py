@@ -24,7 +24,7 @@ class Sweep(NamedTuple):
 
     def arm(self, payload) -> jf.Arm:
         """The arm with this payload [kg]."""
-        return jf.ahmad_arm(payload, drive="torque")
+        return jf.ahmad_arm(payload, drive="torque", mode_shapes="clamped_tip_mass")
 
     def models(self) -> jf.AssembledArm:
         """All arms assembled, the payload on the leading axis."""

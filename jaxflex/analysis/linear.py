@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex, Float
 
-from ..arm.arm import Arm
+from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference, Setpoint
 from ..scalars import Scalar, scalar
 from ..sensors import channel_names, read_channels
@@ -62,7 +62,6 @@ class _Commands(AbstractController):
         return None
 
 
-@eqx.filter_jit
 def linearise(
     arm: Arm,
     pose: Float[Array, " joints"],
@@ -76,8 +75,18 @@ def linearise(
     The arm is taken undeflected, so with gravity the result holds where its sag is
     small. Voltage limits and friction enter by their slope at rest.
     """
-    joints = len(arm.joints)
-    model = arm.assemble()
+    # the arm's constants come from a program of their own, which all that needs them shares
+    return _linearise(arm.assemble(), pose, controller, channels)
+
+
+@eqx.filter_jit
+def _linearise(
+    model: AssembledArm,
+    pose: Float[Array, " joints"],
+    controller: AbstractController | None,
+    channels: Sequence[str] | None,
+) -> LinearModel:
+    joints = len(model.joints)
     closed = controller is not None
     law = controller if closed else _Commands()
     inputs = 3 * joints if closed else joints

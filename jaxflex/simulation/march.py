@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, Int
 from ..scalars import Scalar
 from .plant import Plant, State, derivative
 
-CHECKPOINTS = 16  # states kept between two instants while going backwards
+CHECKPOINTS = 32  # states kept between two instants for going backwards
 SLACK = 1e-9  # share of a step by which an interval may exceed a whole number of them
 
 
@@ -54,8 +54,6 @@ def march(
             state = jax.lax.fori_loop(0, count, advance, state)
         return state, state
 
-    if backwards:
-        interval = jax.checkpoint(interval)  # pyright: ignore
     _, after = jax.lax.scan(interval, start, (instants[:-1], instants[1:], counts))
     wanted = jnp.searchsorted(jax.lax.stop_gradient(instants[1:]), jax.lax.stop_gradient(times[1:]))
     saved = jtu.tree_map(lambda first, rest: jnp.concatenate([first[None], rest[wanted]]), start, after)
