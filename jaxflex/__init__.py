@@ -83,6 +83,7 @@ from .simulation.derivatives import value_and_gradient as value_and_gradient
 from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive
 from .simulation.methods import Fixed as Fixed
+from .simulation.rosenbrock import LinearlyImplicit as LinearlyImplicit
 from .simulation.runge_kutta import RungeKutta4 as RungeKutta4
 from .simulation.simulate import InitialState as InitialState
 from .simulation.simulate import simulate as simulate

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxflex as jf
+from jaxflex.arm.kinematics import poses
 
 from .c_code import Compiled
 from .equations import Equations
@@ -33,7 +34,7 @@ def run_library(sweep: Sweep, method: jf.AbstractMethod) -> Callable[[], np.ndar
     def last(payload):
         run = jf.simulate(
             sweep.arm(payload), sweep.controller, sweep.move, jnp.array([0.0, DURATION]),
-            method=method, channels=["tip_x", "tip_y"], adjoint=None,
+            method=method, channels=["tip_x", "tip_y"],
         )  # fmt: skip
         return run.tip[-1]
 
@@ -45,7 +46,7 @@ def tips(sweep: Sweep, states: np.ndarray) -> np.ndarray:
 
     def one(payload, state):
         model = sweep.arm(payload).assemble()
-        _, ends = jf.poses(model, tuple(state[: model.size]))
+        _, ends = poses(model, tuple(state[: model.size]))
         return jnp.stack([ends[-1].x, ends[-1].y])
 
     return np.asarray(jax.jit(jax.vmap(one))(jnp.asarray(sweep.payloads), jnp.asarray(states.T)))

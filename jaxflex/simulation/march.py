@@ -1,4 +1,4 @@
-"""Classical Runge-Kutta steps from one instant that matters to the next.
+"""Steps of equal length from one instant that matters to the next.
 
 The instants are the times wanted and the jumps of reference and disturbance; between two of
 them steps are of equal length, no longer than asked for. What comes of it against a general
@@ -15,6 +15,8 @@ from jaxtyping import Array, Float, Int
 
 from ..scalars import Scalar
 from .plant import Plant, State, derivative
+from .rosenbrock import LinearlyImplicit, rosenbrock_step
+from .runge_kutta import RungeKutta4
 
 CHECKPOINTS = 32  # states kept between two instants for going backwards
 SLACK = 1e-9  # share of a step by which an interval may exceed a whole number of them
@@ -28,12 +30,14 @@ def march(
     dt: Scalar,
     max_steps: int,
     backwards: bool,
+    solver: RungeKutta4 | LinearlyImplicit,
 ) -> tuple[State, Int[Array, ""]]:
     """States at `times` [s] from `start` at the first of them, and how many steps they take.
 
     No step is longer than `dt` [s]. Where more than `max_steps` would be needed, none are
     taken. `backwards`: keep what reverse mode needs; without, forward mode alone works.
     """
+    step = rosenbrock_step if isinstance(solver, LinearlyImplicit) else classical_step
     inside = jnp.clip(jumps, times[0], times[-1])
     instants = jnp.sort(jnp.concatenate([times, inside]))
     lengths = jnp.diff(instants)
@@ -44,9 +48,11 @@ def march(
     def interval(state, given):
         begin, end, count = given
         h = (end - begin) / jnp.maximum(count, 1)
+        # what happens at the end of an interval, such as a jump, is not yet seen
+        before = jnp.nextafter(jax.lax.stop_gradient(end), jax.lax.stop_gradient(begin))
 
         def advance(i, state):
-            return step(plant, begin + i * h, h, end, state)
+            return step(plant, begin + i * h, h, before, state)
 
         if backwards:
             state = _loop_backwards(count, advance, state)
@@ -60,9 +66,8 @@ def march(
     return saved, total
 
 
-def step(plant: Plant, t: Scalar, h: Scalar, end: Scalar, state: State) -> State:
-    """One step of `h` [s] from `t` (Kutta 1901), what happens at `end` not yet seen."""
-    before = jnp.nextafter(jax.lax.stop_gradient(end), jax.lax.stop_gradient(t))
+def classical_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: State) -> State:
+    """One step of `h` [s] from `t` (Kutta 1901), nothing seen of what happens after `before`."""
 
     def moved(a, slope, by):
         return jtu.tree_map(lambda x, s: x + by * s, a, slope)
@@ -72,7 +77,7 @@ def step(plant: Plant, t: Scalar, h: Scalar, end: Scalar, state: State) -> State
         slope, total = carry
         ahead, share = weights
         now = t + ahead * h
-        # at the end of an interval a reference may jump: its value just before, its derivative as it is
+        # its value just before the end, its derivative as it is
         seen = now - jax.lax.stop_gradient(jnp.maximum(now - before, 0.0))
         slope = derivative(seen, moved(state, slope, ahead * h), plant)
         return (slope, moved(total, slope, share)), None

@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..scalars import Scalar, optional_scalar
 from .plant import Plant, State
+from .rosenbrock import LinearlyImplicit
 from .runge_kutta import RungeKutta4
 
 SMALLEST_STEP = 1e-10  # s; an adaptive solve that asks for less has failed
@@ -92,7 +93,8 @@ class Fixed(AbstractMethod):
 
     With the classical Runge-Kutta method, the default, and continuous control, steps
     between two instants are of equal length and run in a loop of their own (`march`),
-    many times faster for a batch than any other method here. Any other explicit solver of
+    many times faster for a batch than any other method here, and so does
+    `LinearlyImplicit()`, for longer steps. Any other explicit solver of
     diffrax will do, on a grid of `dt` cut short at each instant.
 
     `dt=None` takes `stability` over the fastest rate of the loop at the start: right where
@@ -101,7 +103,7 @@ class Fixed(AbstractMethod):
     """
 
     dt: Scalar | None = eqx.field(converter=optional_scalar)
-    solver: diffrax.AbstractSolver = RungeKutta4()
+    solver: diffrax.AbstractSolver | LinearlyImplicit = RungeKutta4()
     stability: float = eqx.field(static=True, default=2.0)
 
     def needs_fastest(self) -> bool:
@@ -109,8 +111,10 @@ class Fixed(AbstractMethod):
         return self.dt is None
 
     def marches(self, sampled: bool) -> bool:
-        """True if `march` serves: the classical method, and no sampled control."""
-        return type(self.solver) is RungeKutta4 and not sampled
+        """True if `march` serves: the classical or the linearly implicit method, and no sampled control."""
+        if isinstance(self.solver, LinearlyImplicit) and (sampled or self.dt is None):
+            raise ValueError("Fixed(dt, LinearlyImplicit()) needs a step dt and continuous control.")
+        return type(self.solver) in (RungeKutta4, LinearlyImplicit) and not sampled
 
     def step(self, fastest: Scalar | None, span: Scalar) -> Scalar:
         """The longest step [s]: `dt`, or what `fastest` [rad/s] allows, but a hundredth of `span` [s]."""

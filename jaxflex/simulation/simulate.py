@@ -155,7 +155,7 @@ def _march(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
     fastest = fastest_rate(times[0], start, plant) if method.needs_fastest() else None
     dt = method.step(fastest, times[-1] - times[0])
     backwards = not isinstance(adjoint, diffrax.ForwardMode)
-    states, steps = march(plant, start, times, _jumps(plant), dt, max_steps, backwards)
+    states, steps = march(plant, start, times, _jumps(plant), dt, max_steps, backwards, method.solver)
     outcome = jnp.where(steps > max_steps, STEPS_EXHAUSTED, OK)
     return states, outcome, steps, jnp.zeros_like(steps)
 
