@@ -12,9 +12,9 @@ A primitive of its own, so that its derivatives are itself: exact to all orders.
 import jax
 import jax.numpy as jnp
 from jax import Array
-from jax.typing import ArrayLike
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
+from jax.typing import ArrayLike
 
 # (parts of pi/2, sine, cosine): sin r = r + r^3 S(r^2), cos r = 1 - r^2/2 + r^4 C(r^2)
 _DOUBLE = (

@@ -45,5 +45,5 @@ def test_derivatives_to_the_third_order_in_both_modes():
 
 
 def test_program_holds_the_pair_once():
-    program = str(jax.make_jaxpr(jax.vmap(lambda x: sin_cos(x)))(jnp.zeros(3)))
+    program = str(jax.make_jaxpr(jax.vmap(sin_cos))(jnp.zeros(3)))
     assert program.count("sin_cos") == 1

@@ -142,11 +142,12 @@ def _split(expressions: list[sp.Expr], q: list, qd: list):
         terms = []
         for powers, coefficient in sp.Poly(sp.expand(expression), *state).terms():
             monomial = sp.Mul(*(x**n for x, n in zip(state, powers, strict=True)))
+            named = coefficient
             if not coefficient.is_number:
                 key = coefficient if (-coefficient) not in once else -coefficient
                 sign = 1 if key is coefficient else -1
-                coefficient = sign * once.setdefault(key, sp.Symbol(f"h[{len(once)}]"))
-            terms.append((coefficient, monomial))
+                named = sign * once.setdefault(key, sp.Symbol(f"h[{len(once)}]"))
+            terms.append((named, monomial))
         replaced.append(sp.horner(sum(c * m for c, m in terms), wrt=state) if terms else sp.Integer(0))
     return replaced, once
 
@@ -167,11 +168,17 @@ def source(e: Equations) -> str:
     body = [f"    real {s} = {printer.doprint(x)};" for s, x in shared]
     body.append("    real m[N][N], l[N][N], inv[N];")
     entries = iter(out)
-    body += [f"    m[{i}][{j}] = {printer.doprint(next(entries))} + 0 * y[0];" for i in range(n) for j in range(i + 1)]
+    body += [
+        f"    m[{i}][{j}] = {printer.doprint(next(entries))} + 0 * y[0];"
+        for i in range(n)
+        for j in range(i + 1)
+    ]
     body += [f"    f[{i}] -= {printer.doprint(next(entries))};" for i in range(n)]
     once_shared, once_out = sp.cse(list(once))
     first = [f"    real {s} = {printer.doprint(x)};" for s, x in once_shared]
-    first += [f"    {s} = {printer.doprint(x)} + 0 * p[0];" for s, x in zip(once.values(), once_out, strict=True)]
+    first += [
+        f"    {s} = {printer.doprint(x)} + 0 * p[0];" for s, x in zip(once.values(), once_out, strict=True)
+    ]
     command = [
         f"    f[{i}] = {float(GAINS.stiffness[i])!r} * ({STOP[i]!r} * share - q[{i}])"
         f" + {float(GAINS.damping[i])!r} * ({STOP[i]!r} * rate - v[{i}]);"

@@ -71,7 +71,9 @@ def library_rows(sweep: Sweep, exact: np.ndarray, methods: dict[str, jf.Abstract
     return rows
 
 
-def c_rows(sweep: Sweep, e: Equations, exact: np.ndarray, steps: tuple[float, ...], folder: Path) -> list[dict]:
+def c_rows(
+    sweep: Sweep, e: Equations, exact: np.ndarray, steps: tuple[float, ...], folder: Path
+) -> list[dict]:
     """Scalar and eight-wide C, classical Runge-Kutta."""
     rows = []
     for lanes, name in ((1, "scalar C"), (8, "vector C")):

@@ -24,7 +24,7 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
     rates, _ = model.split(qd)
     _, etas = model.split(q)
     _, eta_rates = model.split(qd)
-    twice = 0.0
+    twice = jnp.zeros_like(rates[0])
     for i, body in enumerate(bodies(model)):
         u, v, omega = frames[i]
         eta, eta_rate = etas[i], eta_rates[i]

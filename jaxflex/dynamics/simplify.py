@@ -6,6 +6,9 @@ most of the time before a first simulation went there. Here the program is clean
 after it is traced, before anything is done with it.
 """
 
+# the abstract values of arrays have attributes that their base class does not declare
+# pyright: reportAttributeAccessIssue=false
+
 from collections.abc import Callable
 from functools import wraps
 
@@ -85,9 +88,9 @@ def _idle(equation: core.JaxprEqn, operands: list):
             return other
         if name == "mul" and value.val == 0 and value.aval.weak_type == aval.weak_type:
             return value
-    if isinstance(y, core.Literal) and x.aval.weak_type == aval.weak_type:
-        if (name == "sub" and y.val == 0) or (name == "div" and y.val == 1):
-            return x
+    harmless = {"sub": 0, "div": 1}.get(name)
+    if isinstance(y, core.Literal) and x.aval.weak_type == aval.weak_type and y.val == harmless:
+        return x
     return None
 
 

@@ -18,7 +18,6 @@ from jaxtyping import Array, Float, PyTree
 
 from ..scalars import Scalar
 
-
 FEW = 24  # parameters up to which forward mode is the better one, compilation counted
 
 

@@ -6,7 +6,6 @@ solver: a batch goes through one short loop that the compiler fuses whole, and t
 jump has its true derivative, since the steps before and after it stretch with it.
 """
 
-import equinox as eqx
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
@@ -54,10 +53,8 @@ def march(
         def advance(i, state):
             return step(plant, begin + i * h, h, before, state)
 
-        if backwards:
-            state = _loop_backwards(count, advance, state)
-        else:
-            state = jax.lax.fori_loop(0, count, advance, state)
+        loop = _loop_backwards if backwards else _loop
+        state = loop(count, advance, state)
         return state, state
 
     _, after = jax.lax.scan(interval, start, (instants[:-1], instants[1:], counts))
@@ -86,6 +83,10 @@ def classical_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: St
     weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
     (_, total), _ = jax.lax.scan(stage, (zero, zero), weights)
     return moved(state, total, h)
+
+
+def _loop(count: Int[Array, ""], advance, state: State) -> State:
+    return jax.lax.fori_loop(0, count, advance, state)
 
 
 def _loop_backwards(count: Int[Array, ""], advance, state: State) -> State:

@@ -102,7 +102,7 @@ class Fixed(AbstractMethod):
     up to 2.78; the rest is for poses in which the arm is faster than at the start.
     """
 
-    dt: Scalar | None = eqx.field(converter=optional_scalar)
+    dt: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     solver: diffrax.AbstractSolver | LinearlyImplicit = RungeKutta4()
     stability: float = eqx.field(static=True, default=2.0)
 

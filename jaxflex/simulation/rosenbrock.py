@@ -23,7 +23,7 @@ import numpy as np
 from ..drive import has_current_state
 from ..dynamics.lagrange import inertia
 from ..dynamics.ldl import factorised, substitute
-from ..scalars import Scalar
+from ..scalars import Scalar, dot
 from .plant import Plant, State, derivative
 
 _GAMMA = 0.435866521508459
@@ -72,7 +72,13 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
         [value / g + (damping[i] + g * stiffness[i] if i == j else 0.0) for j, value in enumerate(row)]
         for i, row in enumerate(mass)
     ]
+    # its inverse, once a step: rows times a vector are independent of one another, which XLA fuses
+    # without computing anything twice, a substitution is not
     factor = factorised(shifted)
+    one = jnp.ones_like(t)
+    inverse = [
+        substitute(*factor, tuple(one * (i == j) for j in range(model.size))) for i in range(model.size)
+    ]
     decays = tuple(
         joint.motor.resistance / joint.motor.inductance  # pyright: ignore
         for i, joint in enumerate(model.joints)
@@ -81,10 +87,11 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
 
     def solved(r: State) -> State:
         """`u` with `(1 / g - J) u = r`."""
-        right = tuple(
-            _row(mass, i, r.qd) - g * k * x for i, (k, x) in enumerate(zip(stiffness, r.q, strict=True))
+        # M r / g = (shifted - D - g K) r, so M itself is not needed
+        pull = tuple(
+            (d + g * k) * v + k * x for d, k, x, v in zip(damping, stiffness, r.q, r.qd, strict=True)
         )
-        rates = substitute(*factor, right)
+        rates = tuple(g * (v - dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
         moved = tuple(g * (x + v) for x, v in zip(r.q, rates, strict=True))
         rest = jtu.tree_map(lambda x: g * x, r)
         current = r.current and tuple(x / (1 / g + d) for x, d in zip(r.current, decays, strict=True))
@@ -126,9 +133,3 @@ def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
     none = (jnp.zeros_like(t),) * (plant.model.size - joints)
     held_by, slowed_by = zip(*pairs, strict=True)
     return held_by + none, slowed_by + none
-
-
-def _row(lower: list, i: int, x: tuple) -> Scalar:
-    """Row i of a symmetric matrix, given by its lower triangle, times a vector."""
-    terms = [lower[max(i, j)][min(i, j)] * value for j, value in enumerate(x)]
-    return sum(terms[1:], terms[0])

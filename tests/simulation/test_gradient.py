@@ -12,7 +12,9 @@ def push(values):
     arm = jf.ahmad_arm(0.05, modes=1, drive="torque")
     torque = Sampled(jnp.linspace(0.0, 0.3, values.shape[0]), jnp.stack([values, 0.3 * values], 1), "linear")
     adjoint = jf.adjoint_for(values.shape[0])
-    run = jf.simulate(arm, OpenLoop(), torque, TIMES, method=jf.Fixed(1e-3), channels=["tip_y"], adjoint=adjoint)
+    run = jf.simulate(
+        arm, OpenLoop(), torque, TIMES, method=jf.Fixed(1e-3), channels=["tip_y"], adjoint=adjoint
+    )
     return run["tip_y"][-1]
 
 
