@@ -64,7 +64,7 @@ def run(
         design.reference,
         times,
         initial=InitialState(angles=jnp.stack(design.move.start)),
-        method=method or Fixed(None),
+        method=method or Fixed(),
         **options,
     )
 

@@ -153,7 +153,7 @@ def cost(problem: Problem, values: dict[str, Array]) -> Scalar:
             design,
             arm,
             times,
-            method=Fixed(None),  # stability, not accuracy, sets the step here
+            method=Fixed(),  # stability, not accuracy, sets the step here
             channels=wanted,
             max_steps=50_000,
             adjoint=adjoint_for(sum(value.size for value in values.values())),

@@ -22,7 +22,9 @@ def plot_work_precision(found: dict) -> Figure:
         style = "o-" if method != "RK4" else "s--"
         axis.loglog(x, y, style, color=COLOURS[program], label=f"{program}, {method}")
     axis.axhline(1e-5, color="0.5", linewidth=0.8)
-    axis.annotate("allowed", (1, 1e-5), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
+    axis.annotate(
+        "allowed", (1, 1e-5), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7
+    )
     axis.set_xlabel(f"seconds for {found['arms']} arms over 2 s")
     axis.set_ylabel("largest error of the tip [m]")
     axis.legend(fontsize=8)

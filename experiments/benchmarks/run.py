@@ -11,7 +11,6 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 import jaxflex as jf
 from jaxflex.dynamics.lagrange import accelerations
