@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,8 +9,8 @@ from jaxtyping import Array, Float
 
 from jaxflex import (
     AbstractMethod,
-    Adaptive,
     Arm,
+    Fixed,
     InitialState,
     Trajectory,
     electrical_energy,
@@ -65,7 +64,7 @@ def run(
         design.reference,
         times,
         initial=InitialState(angles=jnp.stack(design.move.start)),
-        method=method or Adaptive(rtol=1e-6, atol=1e-8, solver=diffrax.Bosh3(), stability=None),
+        method=method or Fixed(),
         **options,
     )
 

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from jaxflex import (
     AbstractController,
     Arm,
+    AssembledArm,
     Scalar,
     ScalarLike,
     closed_loop_modes,
@@ -41,7 +42,6 @@ class Design(eqx.Module):
         return self.reference.end()
 
 
-@eqx.filter_jit
 def textbook_pd(
     arm: Arm,
     pose: Float[Array, " joints"],
@@ -63,8 +63,12 @@ def textbook_pd(
         locked = locked_frequencies(arm, pose)
         bandwidth = 2 * jnp.pi * (locked[0] / 3 if locked.shape[0] else 1.0)
     omega = scalar(bandwidth)
-    n = len(arm.joints)
-    model = arm.assemble()
+    return _textbook(arm.assemble(), pose, omega, feedforward)
+
+
+@eqx.filter_jit
+def _textbook(model: AssembledArm, pose: Float[Array, " joints"], omega: Scalar, feedforward: bool) -> PD:
+    arm, n = model.arm, len(model.joints)
     inertia = jnp.diag(mass_matrix(model, jnp.zeros(model.size).at[:n].set(pose)))
     stiffness, damping, rate, acceleration = [], [], [], []
     for i, joint in enumerate(arm.joints):
@@ -148,7 +152,6 @@ def stack(designs: list[Design]) -> Design:
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 
 
-@eqx.filter_jit
 def default_move(arm: Arm) -> Move:
     """A move that makes the arm ring: 0.8 rad of the first joint, 0.5 rad of the others, quintic.
 

@@ -11,7 +11,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, PyTree
 
-from jaxflex import Scalar
+from jaxflex import Scalar, value_and_gradient
 
 Free = Float[Array, " free"]
 Starts = Float[Array, "starts free"]
@@ -46,7 +46,7 @@ class Stepper(eqx.Module):
 
 
 def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
-    """`objective`, its derivative computed together with it, forwards, all parameters at once.
+    """`objective`, its derivative computed together with it, in the mode that suits their number.
 
     A minimiser that linearises its function then runs the simulation once a step. What
     the objective returns beside its cost has no derivative.
@@ -59,11 +59,9 @@ def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
 
         @of.defjvp
         def _(primals, tangents):
-            def twice(x):
-                value, aux = objective(x, args)
-                return value, (value, aux)
-
-            gradient, (value, aux) = jax.jacfwd(twice, has_aux=True)(primals[0])
+            (value, aux), gradient = value_and_gradient(lambda x: objective(x, args), has_aux=True)(
+                primals[0]
+            )
             nothing = jax.tree_util.tree_map(jnp.zeros_like, aux)
             return (value, aux), (jnp.dot(gradient, tangents[0]), nothing)
 

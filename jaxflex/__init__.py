@@ -85,12 +85,19 @@ from .scalars import scalar as scalar
 from .sensors import Sensor as Sensor
 from .sensors import quantised as quantised
 
+# What to call first in a notebook
+from .session import set_up as set_up
+
 # Simulation
+from .simulation.derivatives import adjoint_for as adjoint_for
+from .simulation.derivatives import value_and_gradient as value_and_gradient
 from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive
 from .simulation.methods import Fixed as Fixed
+from .simulation.rosenbrock import LinearlyImplicit as LinearlyImplicit
 from .simulation.runge_kutta import RungeKutta4 as RungeKutta4
 from .simulation.simulate import InitialState as InitialState
 from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import SimulationError as SimulationError
 from .simulation.trajectory import Trajectory as Trajectory
+from .sweep import sweep as sweep

@@ -24,7 +24,5 @@ def optional_scalar(value: ScalarLike | None) -> Scalar | None:
 
 def dot(a: tuple, b: tuple) -> Scalar | float:
     """Sum of products of two tuples of scalars, in the form XLA fuses (no arrays)."""
-    total = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
+    terms = [x * y for x, y in zip(a, b, strict=True)]
+    return sum(terms[1:], terms[0]) if terms else 0.0

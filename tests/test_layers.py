@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = [
-    ["jaxflex.scalars", "jaxflex.py"],
+    ["jaxflex.scalars", "jaxflex.trigonometry", "jaxflex.session", "jaxflex.sweep", "jaxflex.py"],
     ["jaxflex.beam", "jaxflex.motor", "jaxflex.effects"],
     ["jaxflex.arm"],
     ["jaxflex.dynamics"],

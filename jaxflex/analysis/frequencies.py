@@ -28,7 +28,6 @@ def _stretched(model: AssembledArm, pose: JointVector | None) -> Float[Array, " 
     return q if pose is None else q.at[: len(model.joints)].set(pose)
 
 
-@eqx.filter_jit
 def driven_frequencies(
     arm: Arm, pose: JointVector | None = None, joint_stiffness: JointVector | None = None
 ) -> Float[Array, " coordinates"]:
@@ -38,17 +37,26 @@ def driven_frequencies(
     [N m/rad]: a spring at each joint, such as a stiff controller makes. Gravity's
     stiffness is left out. Shape `(coordinates,)`, ascending.
     """
-    model = arm.assemble()
+    return _driven(arm.assemble(), pose, joint_stiffness)
+
+
+@eqx.filter_jit
+def _driven(
+    model: AssembledArm, pose: JointVector | None, joint_stiffness: JointVector | None
+) -> Float[Array, " coordinates"]:
     stiffness = jnp.stack(model.stiffness())
     if joint_stiffness is not None:
         stiffness = stiffness.at[: len(model.joints)].set(joint_stiffness)
     return undamped_frequencies(jnp.diag(stiffness), mass_matrix(model, _stretched(model, pose)))
 
 
-@eqx.filter_jit
 def locked_frequencies(arm: Arm, pose: JointVector | None = None) -> Float[Array, " shapes"]:
     """Undamped natural frequencies [Hz] with all joints locked at `pose`. Shape `(shapes,)`."""
-    model = arm.assemble()
+    return _locked(arm.assemble(), pose)
+
+
+@eqx.filter_jit
+def _locked(model: AssembledArm, pose: JointVector | None) -> Float[Array, " shapes"]:
     n = len(model.joints)
     if model.size == n:
         return jnp.zeros(0)

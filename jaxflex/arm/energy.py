@@ -2,9 +2,11 @@
 
 import jax.numpy as jnp
 
-from ..beam.link_model import half_form
+from ..beam.link_model import half_form, symmetric_form
 from ..scalars import Scalar, dot
+from ..trigonometry import sin_cos
 from .arm import AssembledArm
+from .bodies import bodies, payload_moves
 from .kinematics import poses, velocities
 
 
@@ -13,9 +15,8 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
 
     A point of link i moves with `(u - omega w, v + omega x + w')` along the link's axes,
     `(u, v)` and `omega` the velocity and rate of its frame; squared and integrated over
-    the link this leaves the constants of `LinkModel`. Added are the rotors at their
-    relative rate, the hub inertias at the absolute rate of the link they drive, the hub
-    masses at the joints, and the payload.
+    the link this leaves the constants of its `Body`, in which hub and payload are counted.
+    Added are the rotors at their relative rate.
 
     `q`, `qd`: tuples of `model.size` scalars.
     """
@@ -23,39 +24,32 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
     rates, _ = model.split(qd)
     _, etas = model.split(q)
     _, eta_rates = model.split(qd)
-    twice = 0.0
-    for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
+    twice = jnp.zeros_like(rates[0])
+    for i, body in enumerate(bodies(model)):
         u, v, omega = frames[i]
         eta, eta_rate = etas[i], eta_rates[i]
-        bent = dot(link.deflection_integral, eta)
-        bending = dot(link.deflection_integral, eta_rate)
-        spin = dot(link.rotation_integral, eta_rate)
+        bent = dot(body.deflection, eta)
+        bending = dot(body.deflection, eta_rate)
+        spin = dot(body.rotation, eta_rate)
         twice = (
             twice
-            + link.mass * (u * u + v * v)
-            + omega * omega * (link.second_moment + dot(eta, link.inertia_times(eta)))
-            + dot(eta_rate, link.inertia_times(eta_rate))
-            + 2 * (omega * (v * link.first_moment - u * bent + spin) + v * bending)
+            + body.mass * (u * u + v * v)
+            + omega * omega * (body.second_moment + symmetric_form(body.spread, eta))
+            + symmetric_form(body.modal_inertia, eta_rate)
+            + 2 * (omega * (v * body.first_moment - u * bent + spin) + v * bending)
         )
-        if link.shortening is not None:
+        if body.drawn is not None and body.spun is not None:
             # a point that bending draws in by s(x) moves with (u - s', v + omega (x - s)): to the
             # second order in the deflection, that is what the cross terms with s take away
-            short = link.shortening
-            drawn, spun = half_form(short.mean, eta, eta), half_form(short.moment, eta, eta)
-            drawing = 2 * half_form(short.mean, eta, eta_rate)
+            drawn, spun = half_form(body.drawn, eta, eta), half_form(body.spun, eta, eta)
+            drawing = 2 * half_form(body.drawn, eta, eta_rate)
             twice = twice - 2 * (u * drawing + omega * (v * drawn + omega * spun))
-        if link.loose:
-            beyond = omega + eta_rate[-1]
-            share = joint.motor_share
-            twice = twice + joint.hub_inertia * (share * omega * omega + (1 - share) * beyond * beyond)
-        else:
-            twice = twice + joint.hub_inertia * omega * omega
-        twice = twice + joint.reflected_inertia * rates[i] * rates[i]
         if i > 0:
-            twice = twice + joint.hub_mass * (u * u + v * v)
-    payload, tip = model.arm.payload, tips[-1]
-    twice = twice + payload.mass * (tip.x * tip.x + tip.y * tip.y)
-    twice = twice + payload.inertia * tip.rate * tip.rate
+            twice = twice + model.joints[i].reflected_inertia * rates[i] * rates[i]
+    if payload_moves(model):
+        payload, tip = model.arm.payload, tips[-1]
+        twice = twice + payload.mass * (tip.x * tip.x + tip.y * tip.y)
+        twice = twice + payload.inertia * tip.rate * tip.rate
     return 0.5 * twice
 
 
@@ -86,7 +80,7 @@ def mass_moments(model: AssembledArm, q: tuple) -> tuple[Scalar, Scalar]:
     along, across = payload * tips[-1].x, payload * tips[-1].y
     for i, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
         frame = frames[i]
-        c, s = jnp.cos(frame.heading), jnp.sin(frame.heading)
+        s, c = sin_cos(frame.heading)
         bent = dot(link.deflection_integral, etas[i])
         reach = link.first_moment
         if link.shortening is not None:

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from ..beam.link_model import LinkModel, half_form
 from ..scalars import Scalar, dot
+from ..trigonometry import sin_cos
 from .arm import Arm, AssembledArm
 
 
@@ -64,7 +65,7 @@ def velocities(model: AssembledArm, q: tuple, qd: tuple) -> tuple[list[FrameVelo
         tips.append(tip)
         if i + 1 < len(model.links):
             turn = angles[i + 1] + dot(link.tip_slope, etas[i])
-            c, s = jnp.cos(turn), jnp.sin(turn)
+            s, c = sin_cos(turn)
             frame = FrameVelocity(c * tip.x + s * tip.y, c * tip.y - s * tip.x, tip.rate + rates[i + 1])
     return frames, tips
 
@@ -77,7 +78,7 @@ def poses(model: AssembledArm, q: tuple) -> tuple[list[Pose], list[Pose]]:
     for i, link in enumerate(model.links):
         deflection = dot(link.tip_deflection, etas[i])
         length = reach(link, etas[i])
-        c, s = jnp.cos(frame.heading), jnp.sin(frame.heading)
+        s, c = sin_cos(frame.heading)
         tip = Pose(
             frame.x + c * length - s * deflection,
             frame.y + s * length + c * deflection,

@@ -56,10 +56,6 @@ class LinkModel(eqx.Module):
         """Number of deflection coordinates of the link."""
         return len(self.stiffness)
 
-    def inertia_times(self, rates: tuple) -> tuple:
-        """`int rho psi psi^T dx` times a tuple of modal quantities."""
-        return tuple(dot(row, rates) for row in self.modal_inertia)
-
 
 class Shortening(eqx.Module):
     """How much shorter a bent link is: `s(x) = 1/2 eta^T S(x) eta`, `S = int_0^x psi' psi'^T`.
@@ -75,6 +71,14 @@ class Shortening(eqx.Module):
 def half_form(rows: tuple[tuple[Scalar, ...], ...], a: tuple, b: tuple) -> Scalar | float:
     """`1/2 a^T rows b` over scalars."""
     return 0.5 * dot(a, tuple(dot(row, b) for row in rows))
+
+
+def symmetric_form(rows: tuple[tuple[Scalar, ...], ...], a: tuple) -> Scalar | float:
+    """`a^T rows a` over scalars, of which only the upper triangle is read: half the work of all of it."""
+    total = 0.0
+    for j, row in enumerate(rows):
+        total = total + a[j] * (row[j] * a[j] + 2 * dot(row[j + 1 :], a[j + 1 :]))
+    return total
 
 
 def rigid_link(length: Scalar, mass: Scalar) -> LinkModel:

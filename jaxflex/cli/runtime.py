@@ -5,13 +5,12 @@ from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 
-import equinox
-import jax
 import typer
 from rich.console import Console
 
 from ..files.fields import ArmFileError
 from ..files.recording import RecordingError
+from ..session import set_up
 from ..simulation.trajectory import SimulationError
 
 WIDTH = 112  # columns that the widest table needs; a narrower terminal wraps
@@ -25,19 +24,8 @@ class UsageError(ValueError):
 
 
 def prepare() -> None:
-    """Double precision, and compiled programs kept between runs.
-
-    The cache is in `~/.cache/jaxflex`, or where JAXFLEX_CACHE says. A program that calls
-    back to Python cannot be kept, and equinox's run-time checks do; here they give NaN
-    instead, which every simulation looks for. Equinox reads EQX_ON_ERROR when it is first
-    imported, which is before a command line can set it, so its variable is set as well.
-    """
-    os.environ.setdefault("EQX_ON_ERROR", "nan")
-    setattr(equinox._errors, "EQX_ON_ERROR", os.environ["EQX_ON_ERROR"])  # noqa: B010
-    folder = os.environ.get("JAXFLEX_CACHE", str(Path.home() / ".cache" / "jaxflex"))
-    jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_compilation_cache_dir", folder)
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    """`set_up`, its cache in `~/.cache/jaxflex` or where JAXFLEX_CACHE says."""
+    set_up(os.environ.get("JAXFLEX_CACHE", "~/.cache/jaxflex"))
 
 
 def command(function: Callable) -> Callable:

@@ -52,6 +52,25 @@ def damping_vector(model: AssembledArm) -> Coordinates:
     return jnp.stack(model.damping())
 
 
+def _inertia(model: AssembledArm, q: tuple, qd: tuple) -> list[list[Scalar]]:
+    size = len(q)
+    columns = []
+    for j in range(size):
+        # differentiating along one rate at a time lets autodiff drop all that does not
+        # depend on it, which a vmap over unit vectors could not
+        def along(rate, j=j):
+            return jax.grad(kinetic_energy, argnums=2)(model, q, (*qd[:j], rate, *qd[j + 1 :]))
+
+        columns.append(jax.jvp(along, (qd[j],), (jnp.ones_like(qd[j]),))[1])
+    return [[columns[j][i] for j in range(i + 1)] for i in range(size)]
+
+
+@simplified
+def inertia(model: AssembledArm, q: tuple) -> list[list[Scalar]]:
+    """Lower triangle of `M(q)` over scalars, row by row."""
+    return _inertia(model, q, tuple(jnp.zeros_like(x) for x in q))
+
+
 @simplified
 def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
     """`q'' = M^-1 (force - bias)`, all tuples of scalars.
@@ -63,16 +82,7 @@ def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tup
     def momentum(q, qd):
         return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
 
-    size = len(q)
-    columns = []
-    for j in range(size):
-        # differentiating along one rate at a time lets autodiff drop all that does not
-        # depend on it, which a vmap over unit vectors could not
-        def along(rate, j=j):
-            return momentum(q, (*qd[:j], rate, *qd[j + 1 :]))
-
-        columns.append(jax.jvp(along, (qd[j],), (jnp.ones_like(qd[j]),))[1])
-    lower = [[columns[j][i] for j in range(i + 1)] for i in range(size)]
+    lower = _inertia(model, q, qd)
     drift = jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))[1]
     slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
     right = tuple(f - d + s for f, d, s in zip(force, drift, slope, strict=True))

@@ -6,6 +6,9 @@ most of the time before a first simulation went there. Here the program is clean
 after it is traced, before anything is done with it.
 """
 
+# the abstract values of arrays have attributes that their base class does not declare
+# pyright: reportAttributeAccessIssue=false
+
 from collections.abc import Callable
 from functools import wraps
 
@@ -35,12 +38,19 @@ def simplified(function: Callable) -> Callable:
 
 
 def without_waste(program: core.ClosedJaxpr) -> core.ClosedJaxpr:
-    """The same program without equal equations computed twice, and without unused ones."""
-    same: dict = {}  # variable -> the equal one computed first
+    """The same program without equal equations computed twice, idle ones, and unused ones.
+
+    A product with zero is zero here, as it is for the finite numbers that a model is made of.
+    """
+    same: dict = {}  # variable -> the equal variable or literal that stands for it
     first: dict = {}  # operation and operands -> its results
     kept = []
     for equation in program.jaxpr.eqns:
         operands = [v if isinstance(v, core.Literal) else same.get(v, v) for v in equation.invars]
+        idle = _idle(equation, operands)
+        if idle is not None:
+            same[equation.outvars[0]] = idle
+            continue
         key = _key(equation, operands)
         if key is not None and key in first:
             same.update(zip(equation.outvars, first[key], strict=True))
@@ -57,6 +67,31 @@ def without_waste(program: core.ClosedJaxpr) -> core.ClosedJaxpr:
             needed.update(v for v in equation.invars if not isinstance(v, core.Literal))
     jaxpr = program.jaxpr.replace(eqns=useful[::-1], outvars=results)
     return core.ClosedJaxpr(jaxpr, program.consts)
+
+
+def _idle(equation: core.JaxprEqn, operands: list):
+    """The operand that an equation over scalars does no more than repeat, or None."""
+    name, aval = equation.primitive.name, equation.outvars[0].aval
+    if aval.shape or any(v.aval.shape or v.aval.dtype != aval.dtype for v in operands):
+        return None
+    if name == "convert_element_type":
+        return operands[0] if operands[0].aval.weak_type == aval.weak_type else None
+    if len(operands) != 2:
+        return None
+    x, y = operands
+    for value, other in ((x, y), (y, x)):
+        if not isinstance(value, core.Literal) or other.aval.weak_type != aval.weak_type:
+            continue
+        if name in ("add", "add_any") and value.val == 0:
+            return other
+        if name == "mul" and value.val == 1:
+            return other
+        if name == "mul" and value.val == 0 and value.aval.weak_type == aval.weak_type:
+            return value
+    harmless = {"sub": 0, "div": 1}.get(name)
+    if isinstance(y, core.Literal) and x.aval.weak_type == aval.weak_type and y.val == harmless:
+        return x
+    return None
 
 
 def _key(equation: core.JaxprEqn, operands: list):

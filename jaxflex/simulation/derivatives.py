@@ -7,13 +7,50 @@ the first, its transpose through the second.
 """
 
 from collections.abc import Callable
+from typing import Any
 
+import diffrax
 import equinox as eqx
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import PyTree
+from jaxtyping import Array, Float, PyTree
+
+FEW = 24  # parameters up to which forward mode is the better one, compilation counted
+
+
+def adjoint_for(parameters: int) -> diffrax.AbstractAdjoint:
+    """How `simulate` is best differentiated for this many parameters; for its `adjoint`.
+
+    One forward pass carries all parameters side by side and costs about 0.8 of the
+    simulation for each; going backwards costs about 6.5 of it for any number, and twice
+    the time to compile (`experiments/benchmarks`, gradients).
+    """
+    return diffrax.ForwardMode() if parameters <= FEW else diffrax.RecursiveCheckpointAdjoint()
+
+
+def value_and_gradient(function: Callable[[Float[Array, " n"]], Any], has_aux: bool = False):
+    """`x -> (function(x), gradient)`, forwards for few parameters and backwards for many.
+
+    With `has_aux`, `function` returns its value and whatever else is worth knowing.
+
+    Pass `adjoint=adjoint_for(n)` to the simulations inside, which then compile for one
+    mode alone.
+    """
+
+    def call(x: Float[Array, " n"]) -> tuple[Scalar, Float[Array, " n"]]:
+        if x.shape[0] > FEW:
+            return jax.value_and_grad(function, has_aux=has_aux)(x)
+
+        def twice(x):
+            found = function(x)
+            return (found[0] if has_aux else found), found
+
+        gradient, value = jax.jacfwd(twice, has_aux=True)(x)
+        return value, gradient
+
+    return call
 
 
 def both_modes(forward: Callable[[PyTree], PyTree], reverse: Callable[[PyTree], PyTree]):

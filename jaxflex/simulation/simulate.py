@@ -1,6 +1,7 @@
 """Simulate an arm under a controller: the one call that everything else is built on."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import diffrax
 import equinox as eqx
@@ -16,7 +17,8 @@ from ..effects import AbstractSensorEffect
 from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
-from .methods import AbstractMethod, Adaptive, SampleAndHold, sample
+from .march import march
+from .methods import AbstractMethod, Adaptive, Fixed, SampleAndHold, sample
 from .plant import Plant, State, derivative
 from .stiffness import fastest_rate
 from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
@@ -155,6 +157,59 @@ def has_diverged(model: AssembledArm, q: tuple) -> Array:
     return bad
 
 
+def _jumps(plant: Plant) -> Float[Array, " jumps"]:
+    signals = [s for s in (plant.reference, plant.disturbance) if s is not None]
+    return jnp.concatenate([signal.jumps() for signal in signals])
+
+
+def _march(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
+    """States at the times, outcome and numbers of steps, by steps of equal length."""
+    plant, start, times, method = inputs
+    fastest = fastest_rate(times[0], start, plant) if method.needs_fastest() else None
+    dt = method.step(fastest, times[-1] - times[0])
+    backwards = not isinstance(adjoint, diffrax.ForwardMode)
+    states, steps = march(plant, start, times, _jumps(plant), dt, max_steps, backwards, method.solver)
+    outcome = jnp.where(steps > max_steps, STEPS_EXHAUSTED, OK)
+    return states, outcome, steps, jnp.zeros_like(steps)
+
+
+def _solve(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
+    """The same by a solver of diffrax."""
+    plant, start, times, method = inputs
+    jumps = jax.lax.stop_gradient(_jumps(plant))
+    t0 = times[0]
+    solver = method.solver
+    if plant.sample_time is not None:
+        if isinstance(adjoint, diffrax.ForwardMode) and hasattr(solver, "scan_kind"):
+            # diffrax sets this itself, but not inside a wrapper
+            solver = eqx.tree_at(lambda s: s.scan_kind, solver, "lax", is_leaf=lambda x: x is None)
+        solver = SampleAndHold(solver, t0)
+    fastest = fastest_rate(t0, start, plant) if method.needs_fastest() else None
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(derivative),
+        solver,
+        t0,
+        times[-1],
+        method.first_step(),
+        start,
+        args=plant,
+        saveat=diffrax.SaveAt(ts=times),
+        stepsize_controller=method.controller(jumps, t0, plant.sample_time, fastest),
+        adjoint=adjoint,
+        event=diffrax.Event(lambda t, y, args, **_: has_diverged(args.model, y.q)),
+        max_steps=max_steps,
+        throw=False,
+    )
+    results = diffrax.RESULTS
+    outcome = jnp.select(
+        [solution.result == results.event_occurred, solution.result == results.max_steps_reached],
+        [DIVERGED, STEPS_EXHAUSTED],
+        jnp.where(solution.result == results.successful, OK, STEP_TOO_SMALL),
+    )
+    stats = solution.stats
+    return solution.ys, outcome, stats["num_accepted_steps"], stats["num_rejected_steps"]
+
+
 def _integrate(
     plant: Plant,
     start: State,
@@ -164,43 +219,9 @@ def _integrate(
     max_steps: int,
     adjoint: diffrax.AbstractAdjoint | None,
 ) -> Trajectory:
-    def solve(inputs, adjoint):
-        plant, start, times, method = inputs
-        signals = [s for s in (plant.reference, plant.disturbance) if s is not None]
-        jumps = jax.lax.stop_gradient(jnp.concatenate([signal.jumps() for signal in signals]))
-        t0 = times[0]
-        solver = method.solver
-        if plant.sample_time is not None:
-            if isinstance(adjoint, diffrax.ForwardMode) and hasattr(solver, "scan_kind"):
-                # diffrax sets this itself, but not inside a wrapper
-                solver = eqx.tree_at(lambda s: s.scan_kind, solver, "lax", is_leaf=lambda x: x is None)
-            solver = SampleAndHold(solver, t0)
-        fastest = fastest_rate(t0, start, plant) if method.needs_fastest() else None
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(derivative),
-            solver,
-            t0,
-            times[-1],
-            method.first_step(),
-            start,
-            args=plant,
-            saveat=diffrax.SaveAt(ts=times),
-            stepsize_controller=method.controller(jumps, t0, plant.sample_time, fastest),
-            adjoint=adjoint,
-            event=diffrax.Event(lambda t, y, args, **_: has_diverged(args.model, y.q)),
-            max_steps=max_steps,
-            throw=False,
-        )
-        results = diffrax.RESULTS
-        outcome = jnp.select(
-            [solution.result == results.event_occurred, solution.result == results.max_steps_reached],
-            [DIVERGED, STEPS_EXHAUSTED],
-            jnp.where(solution.result == results.successful, OK, STEP_TOO_SMALL),
-        )
-        stats = solution.stats
-        return solution.ys, outcome, stats["num_accepted_steps"], stats["num_rejected_steps"]
-
     inputs = (plant, start, times, method)
+    marching = isinstance(method, Fixed) and method.marches(plant.sample_time is not None)
+    solve = partial(_march if marching else _solve, max_steps=max_steps)
     if adjoint is None:
         differentiable = both_modes(
             lambda x: solve(x, diffrax.ForwardMode()),
