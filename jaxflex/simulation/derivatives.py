@@ -39,7 +39,7 @@ def value_and_gradient(function: Callable[[Float[Array, " n"]], Any], has_aux: b
     mode alone.
     """
 
-    def call(x: Float[Array, " n"]) -> tuple[Scalar, Float[Array, " n"]]:
+    def call(x: Float[Array, " n"]) -> tuple[Any, Float[Array, " n"]]:
         if x.shape[0] > FEW:
             return jax.value_and_grad(function, has_aux=has_aux)(x)
 
