@@ -44,6 +44,11 @@ class Candidate:
     free: tuple[str, ...] = ()
 
     @property
+    def count(self) -> int:
+        """Number of parameters that a fit may choose, the sharpness of friction left aside."""
+        return len(self.amplitudes) + sum(name != "transition_rate" for name in self.free)
+
+    @property
     def key(self) -> tuple[str, str]:
         """Effect and location: what a report names."""
         return self.effect, self.location

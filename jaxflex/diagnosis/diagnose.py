@@ -174,7 +174,7 @@ def simplest(confirmed: list[Confirmed]) -> Confirmed:
     """Of the hypotheses that explain practically the same, the one with the fewest parameters."""
     most = max(strength for strength, _, _ in confirmed)
     tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
-    return min(tied, key=lambda entry: (len(entry[1].effects[-1].amplitudes), -entry[0]))
+    return min(tied, key=lambda entry: (entry[1].effects[-1].count, -entry[0]))
 
 
 def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:

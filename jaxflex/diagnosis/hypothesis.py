@@ -269,7 +269,7 @@ class Search:
             for item in rest
             if item.candidate.key != effect.key
             and item.gain > RIVAL * own
-            and len(item.candidate.amplitudes) <= len(effect.amplitudes)
+            and item.candidate.count <= effect.count
         ]
 
     def confirm(self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int) -> Hypothesis:
