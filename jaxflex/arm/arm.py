@@ -168,7 +168,6 @@ class AssembledArm(eqx.Module):
         for link, joint, eta in zip(self.links, self.joints, etas, strict=True):
             found += link.damping
             if link.loose:
-                play = joint.play
-                touching = 1.0 if eta is None or play is None else (jnp.abs(eta[-1]) >= play / 2) * 1.0
+                touching = 1.0 if eta is None else joint.touches(eta[-1]) * 1.0
                 found[-1] = joint.contact_damping * touching
         return tuple(found)

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Array, Bool
 
 from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
 from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
@@ -143,11 +144,18 @@ class Joint(eqx.Module):
     contact_damping: Scalar = eqx.field(converter=scalar, default=0.0)
     motor_share: Scalar = eqx.field(converter=scalar, default=1.0)
 
+    @property
+    def clearance(self) -> Scalar:
+        """Half the play [rad]."""
+        return scalar(0.0 if self.play is None else self.play / 2)
+
     def pressed(self, twist: Scalar) -> Scalar:
         """How far [rad] the flanks of the play are pressed together at a `twist` of the link, signed."""
-        assert self.play is not None
-        gap = self.play / 2
-        return jnp.where(jnp.abs(twist) < gap, 0.0, twist - jnp.sign(twist) * gap)
+        return jnp.where(self.touches(twist), twist - jnp.sign(twist) * self.clearance, 0.0)
+
+    def touches(self, twist: Scalar) -> Bool[Array, ""]:
+        """True if the link has turned through the play to one of its flanks."""
+        return jnp.abs(twist) >= self.clearance
 
     @property
     def reflected_inertia(self) -> Scalar:

@@ -24,6 +24,7 @@ from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem, Run
 
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
+VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
 HORIZON = HORIZONS[-1]
@@ -42,7 +43,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
         float(np.mean([(found[c] / s) ** 2 for c, s in _noise(problem).items()]))
         for found, _ in (before, after)
     ]
-    gone = (levels[0] - levels[1]) / max(levels[0] - 1, 1e-9) if levels[0] > AT_FLOOR else 0.0
+    gone = (levels[0] - levels[1]) / (levels[0] - 1) if levels[0] > VISIBLE else 0.0
     final = everything(prepared, search, outcome)
     estimates = _estimates(search, final)
     effects = tuple(
@@ -93,6 +94,8 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
     for run in runs:
         vector = hypothesis.fit.vector
         for horizon in HORIZONS:
+            if horizon > HORIZONS[0]:
+                problem.join(run, vector)
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
         reading = problem.predict(run, vector).reading

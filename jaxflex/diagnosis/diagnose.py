@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..effects import EFFECTS, SensorGain
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .describe import describe
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Ranked, Search, Starts, without
+from .hypothesis import CLOSE, HORIZONS, PARTS, Hypothesis, Outcome, Ranked, Search, Starts, without
 from .loose_joint import loose_joints
 from .prepare import make_problem
 from .result import Diagnosis
@@ -23,8 +24,11 @@ BENT = 2.0  # departure of the nominal parameters, in standard deviations, that 
 LITTLE = 0.01  # of the gap there was: what may be left over a second where a tenth of one is followed
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
-LEAD = 0.03  # of the gain: what a hypothesis with more parameters must be better by
+LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
+
+
+Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
 
 
 def diagnose(
@@ -102,19 +106,24 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             search.restart(base_starts)
             ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
         tried = _short_list(ranked)
-        bent = departure(search, fitted) > BENT
+        bent = start is None and departure(search, fitted) > BENT
         if len(fitted.effects) == MOST_EFFECTS or not (tried or bent):
             break
         before, before_starts = (base, base_starts) if far else (fitted, starts)
-        if bent:
+        confirmed: list[Confirmed] = []
+
+        def confirm(items, before, before_starts, fitted=fitted, explained=explained, confirmed=confirmed):
+            for item in items:
+                found = search.confirm(before, before_starts, item, fitted.horizon)
+                confirmed.append((found.strength(fitted, explained), found, search.starts()))
+                say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+
+        confirm(tried, before, before_starts)
+        if bent and not (confirmed and decisive(search, simplest(confirmed)[1])):
             search.restart(base_starts)
-            before, before_starts = straightened(search, base)
-            tried = sift(search, before, before_starts, [*tried, *search.parts(before.effects)])
-        confirmed = []
-        for item in tried:
-            found = search.confirm(before, before_starts, item, fitted.horizon)
-            confirmed.append((found.strength(fitted, explained), found, search.starts()))
-            say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+            straight, straight_starts = straightened(search, base)
+            parts = sift(search, straight, straight_starts, search.parts(straight.effects))
+            confirm(parts, straight, straight_starts)
         strength, best, best_starts = simplest(confirmed)
         if strength < STRONG or not _worth_it(fitted, best):
             break
@@ -123,6 +132,13 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
     search.restart(outcome.final_starts)
     prune(search, outcome)
     return outcome
+
+
+def decisive(search: Search, best: Hypothesis) -> bool:
+    """True if nothing is left, and no part of the arm could be meant by what was named."""
+    kind = EFFECTS[best.effects[-1].effect]
+    imitated = issubclass(kind, (*PARTS, SensorGain))
+    return best.fit.level < FAIR and departure(search, best) < BENT and not imitated
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
@@ -154,7 +170,7 @@ def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
     return bool(left < SMALL or gone > HALF * left)
 
 
-def simplest(confirmed: list[tuple[float, Hypothesis, list]]) -> tuple[float, Hypothesis, list]:
+def simplest(confirmed: list[Confirmed]) -> Confirmed:
     """Of the hypotheses that explain practically the same, the one with the fewest parameters."""
     most = max(strength for strength, _, _ in confirmed)
     tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]

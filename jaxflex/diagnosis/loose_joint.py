@@ -75,8 +75,8 @@ def loose_joints(
         for _, _, candidate, vector, starts in sorted(tried)[:FITTED]:
             search.restart(starts)
             own = contact_columns(search.parameters, candidate)
-            vector = fit(prepared.problem, search.runs, vector, own, 1, 2).vector
-            fitted = search.climb((candidate,), vector, to=1, iterations=8)
+            close = fit(prepared.problem, search.runs, vector, own, 1, 2).vector
+            fitted = search.climb((candidate,), close, to=1, iterations=8)
             say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             if best is None or fitted.fit.cost < best[0].fit.cost:
                 best = fitted, search.starts()
