@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from .brief import brief
 from .scalars import Scalar
 
 
@@ -41,6 +42,8 @@ class Measurement(NamedTuple):
 class AbstractReference(eqx.Module):
     """A signal for every joint as a function of time, differentiable in its parameters."""
 
+    __repr__ = brief
+
     @abstractmethod
     def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
         """Value of the signal for every joint at time `t` [s]."""
@@ -72,6 +75,8 @@ class AbstractController(eqx.Module):
     state: `rate` is its time derivative, integrated by the solver under continuous
     control and by one Euler step a sample under sampled control.
     """
+
+    __repr__ = brief
 
     @abstractmethod
     def initial(self) -> PyTree:

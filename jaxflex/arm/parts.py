@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
 from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
+from ..brief import brief
 from ..motor import DCMotor
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
 
@@ -51,6 +52,8 @@ class Link(eqx.Module):
     root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
     root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
     shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    __repr__ = brief
 
     def __check_init__(self):
         if self.modes < 0:
@@ -143,6 +146,8 @@ class Joint(eqx.Module):
     contact_damping: Scalar = eqx.field(converter=scalar, default=0.0)
     motor_share: Scalar = eqx.field(converter=scalar, default=1.0)
 
+    __repr__ = brief
+
     def pressed(self, twist: Scalar) -> Scalar:
         """How far [rad] the flanks of the play are pressed together at a `twist` of the link, signed."""
         assert self.play is not None
@@ -161,3 +166,5 @@ class Payload(eqx.Module):
 
     mass: Scalar = eqx.field(converter=scalar, default=0.0)
     inertia: Scalar = eqx.field(converter=scalar, default=0.0)
+
+    __repr__ = brief
