@@ -4,6 +4,7 @@ Pure functions of pytrees, in SI units: everything works under `jit`, `vmap`, `g
 """
 
 # Analysis
+from .analysis.export import to_control as to_control
 from .analysis.frequencies import clamped_frequencies as clamped_frequencies
 from .analysis.frequencies import driven_frequencies as driven_frequencies
 from .analysis.frequencies import locked_frequencies as locked_frequencies
@@ -68,6 +69,9 @@ from .files.arm_file import load_arm as load_arm
 from .files.arm_file import read_arm_file as read_arm_file
 from .files.arm_file import save_arm as save_arm
 from .files.fields import ArmFileError as ArmFileError
+from .files.model_file import ModelFileError as ModelFileError
+from .files.model_file import load_model as load_model
+from .files.model_file import save_model as save_model
 from .files.prepare import prepare as prepare
 from .files.prepare import require_channels as require_channels
 from .files.read_recording import read_recording as read_recording
@@ -75,6 +79,12 @@ from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
+
+# Pictures
+from .plotting_animation import animate as animate
+from .plotting_run import plot as plot
+
+# Scalars, sensors, modes from recordings
 from .ringing import MeasuredMode as MeasuredMode
 from .ringing import MeasuredModes as MeasuredModes
 from .ringing import measure_modes as measure_modes

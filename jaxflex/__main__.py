@@ -46,7 +46,8 @@ def simulate(
     arm: ArmFile = None,
     payload: Annotated[Optional[float], typer.Option(help="Mass at the tip, kg.")] = None,
     signal: Annotated[
-        Optional[str], typer.Option("--input", help="move, step, bang-bang, or a recording (CSV).")
+        Optional[str],
+        typer.Option("--input", help="move, step, bang-bang, or a recording (.csv, .mat, .tdms, .parquet)."),
     ] = None,
     duration: Annotated[Optional[float], typer.Option(help="Length of the run, s.")] = None,
     dt: Annotated[float, typer.Option(help="Time between the rows of the CSV, s.")] = 0.002,
@@ -72,7 +73,9 @@ def modes(
 @app.command()
 def diagnose(
     arm: Annotated[Path, typer.Argument(metavar="ARM", help="arm.toml of the nominal arm.")],
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Recordings of it (CSV).")],
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Recordings of it (.csv, .mat, .tdms, .parquet).")
+    ],
     json: Json = None,
     output: Output = None,
 ) -> None:

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from .brief import brief
 from .scalars import Scalar
 
 
@@ -44,6 +45,8 @@ class Measurement(NamedTuple):
 class AbstractReference(eqx.Module):
     """A signal for every joint as a function of time, differentiable in its parameters."""
 
+    __repr__ = brief
+
     @abstractmethod
     def __call__(self, t: Scalar) -> tuple[Scalar, ...]:
         """Value of the signal for every joint at time `t` [s]."""
@@ -76,6 +79,8 @@ class AbstractController(eqx.Module):
     control; under sampled control `advance` takes it from one sample to the next. A
     controller with a `period` is sampled wherever it is simulated.
     """
+
+    __repr__ = brief
 
     def period(self) -> Scalar | None:
         """Time [s] from sample to sample; None for a law that is not of itself sampled."""

@@ -12,6 +12,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
+from .brief import brief
 from .scalars import Scalar, ScalarLike, optional_scalar, scalar
 
 
@@ -33,6 +34,8 @@ class DCMotor(eqx.Module):
     gear_ratio: Scalar = eqx.field(converter=scalar, default=1.0)
     efficiency: Scalar = eqx.field(converter=scalar, default=1.0)
     voltage_limit: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    __repr__ = brief
 
     def limited(self, voltage: Scalar) -> Scalar:
         """The voltage [V] that reaches the winding: the command within the limit."""
@@ -69,6 +72,8 @@ class MotorAxis(eqx.Module):
     motor: DCMotor
     inertia: Scalar = eqx.field(converter=scalar)
     viscous_friction: Scalar = eqx.field(converter=scalar, default=0.0)
+
+    __repr__ = brief
 
     def denominator(self) -> Float[Array, " 4"]:
         """`[L J, R J + L b, R b + K_m K_b, 0]`: denominator of (4), highest power first.

@@ -1,14 +1,12 @@
 """Every picture the library draws; each function returns a matplotlib Figure."""
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
-from .sensors import unit
-from .simulation.trajectory import Trajectory
 
 TITLES = {
     "angle": "joint angle",
@@ -26,9 +24,18 @@ TITLES = {
 BEFORE, AFTER = "#c44e52", "#2a6f97"
 
 
+class Picture(Figure):
+    """A figure that notebooks show without pyplot, and so without its list of open figures."""
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.savefig(stream, format="png", dpi=96)
+        return stream.getvalue()
+
+
 def panels(rows: int, columns: int, height: float = 2.6, width: float = 9.0):
     """An empty figure of panels that share their time or frequency axis; sizes in inches."""
-    figure = Figure(figsize=(width, height * rows), layout="constrained")
+    figure = Picture(figsize=(width, height * rows), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
     for axis in axes.flat:
         axis.grid(True, alpha=0.3, linewidth=0.5)
@@ -38,41 +45,6 @@ def panels(rows: int, columns: int, height: float = 2.6, width: float = 9.0):
 
 def _shades(count: int):
     return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
-
-
-def plot_trajectory(trajectory: Trajectory, title: str = "") -> Figure:
-    """One run: angles with their references, deflections, what the motors do, the tip's path in time."""
-    names = [n for n in trajectory.channels if not n.startswith(("reference", "tip_acceleration"))]
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault("tip" if name in ("tip_x", "tip_y") else name.rpartition("_")[0], []).append(name)
-    order = ("angle", "tip_deflection", "tip", "voltage", "current", "torque", "rate", "strain")
-    shown = [kind for kind in order if kind in groups]
-    figure, axes = panels((len(shown) + 1) // 2, 2)
-    times = np.asarray(trajectory.times)
-    for axis, kind in zip(axes.flat, shown, strict=False):
-        for i, name in enumerate(sorted(groups[kind])):
-            label = (
-                name[-1]
-                if kind == "tip"
-                else f"{'link' if 'tip' in kind or kind == 'strain' else 'joint'} {name[-1]}"
-            )
-            axis.plot(times, np.asarray(trajectory[name]), color=f"C{i}", label=label)
-            reference = f"reference_{name[-1]}"
-            if kind == "angle" and reference in trajectory.channels:
-                axis.plot(times, np.asarray(trajectory[reference]), "--", color=f"C{i}", linewidth=0.8)
-        one = sorted(groups[kind])[0]
-        word = "tip position" if kind == "tip" else TITLES[kind]
-        axis.set_ylabel(f"{word} [{unit(one)}]")
-        axis.legend(fontsize=8, frameon=False)
-    for axis in list(axes.flat)[len(shown) :]:
-        axis.remove()
-    for axis in figure.axes[-2:]:
-        axis.set_xlabel("time [s]")
-        axis.tick_params(labelbottom=True)
-    if title:
-        figure.suptitle(title)
-    return figure
 
 
 def plot_before_after(

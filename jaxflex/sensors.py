@@ -8,6 +8,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from .arm.arm import AssembledArm
 from .arm.kinematics import poses, velocities
 from .beam.link_model import LinkModel
+from .brief import brief
 from .drive import DriveState
 from .effects.sensor import first_order_lag
 from .scalars import Scalar, dot, optional_scalar, scalar
@@ -137,6 +138,8 @@ class Sensor(eqx.Module):
     lag: Scalar = eqx.field(converter=scalar, default=0.0)
     noise: Scalar = eqx.field(converter=scalar, default=0.0)
     resolution: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    __repr__ = brief
 
     def read(
         self,

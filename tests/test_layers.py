@@ -7,13 +7,14 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = [
+    ["jaxflex.brief"],
     ["jaxflex.scalars", "jaxflex.trigonometry", "jaxflex.session", "jaxflex.sweep", "jaxflex.py"],
     ["jaxflex.beam", "jaxflex.motor", "jaxflex.effects"],
     ["jaxflex.arm"],
     ["jaxflex.dynamics"],
     ["jaxflex.sensors", "jaxflex.drive", "jaxflex.control"],
     ["jaxflex.simulation"],
-    ["jaxflex.analysis", "jaxflex.files", "jaxflex.plotting"],
+    ["jaxflex.analysis", "jaxflex.files", "jaxflex.plotting", "jaxflex.plotting_run"],
     ["jaxflex.diagnosis", "jaxflex.ringing"],
     ["jaxflex"],
     ["controllers"],

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex, Float
 
@@ -52,6 +53,10 @@ class LinearModel(NamedTuple):
     C: Float[Array, "outputs states"]
     D: Float[Array, "outputs inputs"]
     channels: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        states, inputs = self.B.shape[-2:]
+        return f"LinearModel({states} states, {inputs} inputs; {', '.join(self.channels)})"
 
 
 class _Commands(AbstractController):
@@ -145,6 +150,15 @@ class Modes(NamedTuple):
     frequency: Float[Array, " modes"]
     damping_ratio: Float[Array, " modes"]
     poles: Complex[Array, " modes"]
+
+    def __repr__(self) -> str:
+        if isinstance(self.poles, Tracer) or self.poles.ndim > 1:
+            return f"Modes({self.poles.shape})"
+        rows = [
+            f"  {float(f):10.4g} Hz  damping ratio {float(z):8.4g}"
+            for f, z in zip(self.frequency, self.damping_ratio, strict=True)
+        ]
+        return "\n".join(["Modes", *rows])
 
 
 def closed_loop_modes(linear: LinearModel) -> Modes:

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from ..beam.basis import Distal
 from ..beam.link_model import LinkModel, rigid_link
+from ..brief import brief
 from ..effects import AbstractBodyEffect, AbstractEffect
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
 from .parts import Joint, Link, Payload
@@ -44,6 +45,8 @@ class Arm(eqx.Module):
     effects: tuple[AbstractEffect, ...] = ()
     name: str = eqx.field(static=True, default="arm")
     side_gravity: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    __repr__ = brief
 
     def __check_init__(self):
         if not self.joints:
@@ -133,6 +136,9 @@ class AssembledArm(eqx.Module):
 
     arm: Arm
     links: tuple[LinkModel, ...]
+
+    def __repr__(self) -> str:
+        return f"AssembledArm({self.arm.name!r}, {self.size} coordinates)"
 
     @property
     def joints(self) -> tuple[Joint, ...]:

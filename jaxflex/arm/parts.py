@@ -6,6 +6,7 @@ from jaxtyping import Array, Bool
 
 from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
 from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
+from ..brief import brief
 from ..motor import DCMotor
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
 
@@ -52,6 +53,8 @@ class Link(eqx.Module):
     root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
     root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
     shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+
+    __repr__ = brief
 
     def __check_init__(self):
         if self.modes < 0:
@@ -144,6 +147,8 @@ class Joint(eqx.Module):
     contact_damping: Scalar = eqx.field(converter=scalar, default=0.0)
     motor_share: Scalar = eqx.field(converter=scalar, default=1.0)
 
+    __repr__ = brief
+
     @property
     def clearance(self) -> Scalar:
         """Half the play [rad]."""
@@ -169,3 +174,5 @@ class Payload(eqx.Module):
 
     mass: Scalar = eqx.field(converter=scalar, default=0.0)
     inertia: Scalar = eqx.field(converter=scalar, default=0.0)
+
+    __repr__ = brief

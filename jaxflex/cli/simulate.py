@@ -20,9 +20,10 @@ from ..arm.arm import Arm
 from ..arm.library import ahmad_arm
 from ..control import AbstractController, AbstractReference
 from ..files.arm_file import read_arm_file
+from ..files.foreign import FOREIGN
 from ..files.read_recording import read_recording
 from ..files.tables import write_series
-from ..plotting import plot_trajectory
+from ..plotting_run import plot
 from ..simulation.simulate import InitialState
 from ..simulation.simulate import simulate as run
 from .design_file import read_design
@@ -62,7 +63,7 @@ def simulate(
     channels = {name: np.asarray(trajectory[name]) for name in keep}
     folder = make_folder(output)
     write_series(folder / "run.csv", np.asarray(times), channels)
-    plot_trajectory(trajectory, f"{arm.name}: {words}").savefig(folder / "run.png", dpi=130)
+    plot(trajectory, f"{arm.name}: {words}").savefig(folder / "run.png", dpi=130)
     peaks = {name: float(np.max(np.abs(values))) for name, values in channels.items()}
     for name, value in peaks.items():
         console.print(f"  largest |{name}|  {number(value, 4)} {trajectory.unit(name)}", markup=False)
@@ -98,8 +99,9 @@ def choose(
 
 def _from_file(arm: Arm, controller: AbstractController, path: str):
     """The drive's input or the reference in a recording, whichever it holds."""
-    if not path.lower().endswith(".csv"):
-        raise UsageError(f"--input {path!r}: allowed are move, step, bang-bang or a CSV file.")
+    if Path(path).suffix.lower() not in (".csv", *FOREIGN):
+        allowed = ", ".join(["a CSV file", *FOREIGN])
+        raise UsageError(f"--input {path!r}: allowed are move, step, bang-bang or a recording: {allowed}.")
     recording = read_recording(path)
     for repair in recording.repairs:
         console.print(f"{path}: {repair}", markup=False)

@@ -6,6 +6,7 @@ from typing import Any
 import equinox as eqx
 from jaxtyping import Array, Float, PyTree
 
+from ..brief import brief
 from ..scalars import Scalar
 
 
@@ -30,6 +31,8 @@ class AbstractEffect(eqx.Module):
     place: eqx.AbstractClassVar[str]
     units: eqx.AbstractClassVar[dict[str, str]]
     location: eqx.AbstractVar[str]
+
+    __repr__ = brief
 
     def __check_init__(self):
         if self.place in ("tip", "base"):

@@ -9,6 +9,7 @@ from typing import Any
 from ..arm.arm import DRIVES, Arm
 from ..arm.parts import Joint, Link, Payload
 from ..beam.basis import MODE_SHAPES
+from ..brief import brief
 from ..effects import EFFECTS, AbstractEffect
 from ..motor import DCMotor
 from ..sensors import UNITS
@@ -33,6 +34,8 @@ class ArmFile:
     uncertainty: dict[str, float]
     design: dict[str, Any] | None
     sections: tuple[dict[str, float] | None, ...] = ()
+
+    __repr__ = brief
 
 
 def load_arm(path: str | Path) -> Arm:

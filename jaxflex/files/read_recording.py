@@ -1,20 +1,17 @@
-"""Read a recording from CSV with a header of `channel [unit]`; rows by the million, errors to the row."""
+"""Read a recording: CSV with a header of `channel [unit]`, rows by the million, errors to the row."""
 
 import csv
-import re
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
-from ..sensors import UNITS
 from .checks import findings
+from .foreign import FOREIGN
+from .headers import Table, parse_headers
 from .recording import Recording, RecordingError
-from .units import factor
 
-_HEADER = re.compile(r"^\s*([A-Za-z]\w*)\s*\[\s*([^\]]*?)\s*\]\s*$")
-_WHOLE = ("time", "tip_x", "tip_y")
 _ROWS = 200_000
 """Rows read at a time."""
 
@@ -23,7 +20,10 @@ _SPARSE = 0.5
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Read the CSV at `path` and check it.
+    """Read the file at `path` and check it: CSV, or by its ending MATLAB, LabVIEW TDMS or Parquet.
+
+    `.mat` of version 7.3, `.tdms` and `.parquet` need the extra `recordings`; what is expected
+    in them is said in `jaxflex/files/foreign.py`.
 
     What is mended is said in `repairs`: columns with more than half of their cells missing are
     left out, then rows with an empty cell, NaN or infinity, and rows given twice. What looks wrong and is kept is
@@ -34,18 +34,10 @@ def read_recording(path: str | Path) -> Recording:
     rise, or fewer than two rows.
     """
     file = str(path)
-    try:
-        with open(path, "rb") as stream:
-            lines = 1
-            while block := stream.read(1 << 20):
-                lines += block.count(b"\n")
-        with open(path, newline="", encoding="utf-8-sig") as stream:
-            names, scales = _read_header(file, stream)
-            values, rows = _read_rows(file, stream, names, lines)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{file}: cannot be read: {error}.") from error
-    values *= np.asarray(scales)[:, None]
-    names, values, rows, repairs = _mend(names, values, rows)
+    suffix = Path(path).suffix.lower()
+    table = FOREIGN[suffix](file) if suffix in FOREIGN else _read_csv(file, path)
+    names, values, rows, repairs = _mend(table.names, table.values, table.rows)
+    repairs = (*table.notes, *repairs)
     if values.shape[1] < 2:
         raise RecordingError(
             f"{file}: {values.shape[1]} complete row(s); at least two are needed."
@@ -57,41 +49,23 @@ def read_recording(path: str | Path) -> Recording:
     return recording.noting(*findings(recording))
 
 
-def _read_header(file: str, stream: TextIO) -> tuple[list[str], list[float]]:
-    """Names of the columns and their factors to SI."""
-    columns = next(csv.reader([stream.readline()]), [])
-    if not columns:
-        raise RecordingError(f"{file}: empty; a header of 'channel [unit]' and rows are needed.")
-    names, scales = [], []
-    for column in columns:
-        match = _HEADER.match(column)
-        if match is None:
-            hint = " Columns are separated by commas." if ";" in column or "\t" in column else ""
-            raise RecordingError(
-                f"{file}: column {column!r}: a header such as 'angle_1 [rad]' is needed.{hint}"
-            )
-        name, given = match.groups()
-        base = re.sub(r"_[1-9]\d*$", "", name)
-        if base not in UNITS or (base == name) != (name in _WHOLE):
-            known = ", ".join([*_WHOLE, *(f"{each}_1" for each in UNITS if each not in _WHOLE)])
-            raise RecordingError(
-                f"{file}: column {column!r}: unknown channel; known are {known}, "
-                "where the number is the joint's or link's."
-            )
-        scale = factor(given, UNITS[base])
-        if scale is None:
-            raise RecordingError(
-                f"{file}: column {column!r}: unit [{given}] is not one of [{UNITS[base]}]; "
-                "multiples such as [mrad], [deg] or [mV] are allowed."
-            )
-        names.append(name)
-        scales.append(scale)
-    if names[0] != "time":
-        raise RecordingError(f"{file}: first column {columns[0]!r}: 'time [s]' is needed.")
-    for name in names:
-        if names.count(name) > 1:
-            raise RecordingError(f"{file}: {name}: a channel is given twice; each must be there once.")
-    return names, scales
+def _read_csv(file: str, path: str | Path) -> Table:
+    """The table in a CSV file; `rows` are its lines."""
+    try:
+        with open(path, "rb") as stream:
+            lines = 1
+            while block := stream.read(1 << 20):
+                lines += block.count(b"\n")
+        with open(path, newline="", encoding="utf-8-sig") as stream:
+            columns = next(csv.reader([stream.readline()]), [])
+            if not columns:
+                raise RecordingError(f"{file}: empty; a header of 'channel [unit]' and rows are needed.")
+            names, scales = parse_headers(file, columns)
+            values, rows = _read_rows(file, stream, names, lines)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{file}: cannot be read: {error}.") from error
+    values *= np.asarray(scales)[:, None]
+    return Table(names, values, rows, ())
 
 
 def _read_rows(file: str, stream: TextIO, names: list[str], lines: int) -> tuple[np.ndarray, np.ndarray]:

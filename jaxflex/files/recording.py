@@ -3,8 +3,12 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+
+from ..sensors import unit
+from ..simulation.frames import from_dataset, from_frame, to_dataset, to_frame
 
 GAP = 5.0
 """Steps of time longer than this many sample times are gaps."""
@@ -34,6 +38,8 @@ class Recording:
     source: str = "recording"
 
     def __post_init__(self) -> None:
+        if self.times.ndim != 1:
+            raise RecordingError(f"{self.source}: times: found shape {self.times.shape}; a run has one axis.")
         for name, values in self.channels.items():
             if np.shape(values) != self.times.shape:
                 raise RecordingError(
@@ -44,6 +50,11 @@ class Recording:
         if not np.all(np.diff(self.times) > 0):
             raise RecordingError(f"{self.source}: time does not rise; samples must be in order of time.")
 
+    def __repr__(self) -> str:
+        span = f"{self.times[-1] - self.times[0]:.6g} s every {self.sample_time:.4g} s"
+        names = ", ".join(f"{name} [{unit(name)}]" for name in self.channels)
+        return f"Recording({self.source}: {len(self)} samples, {span}; {names}; {len(self.repairs)} repairs)"
+
     def __len__(self) -> int:
         return len(self.times)
 
@@ -51,6 +62,24 @@ class Recording:
         if channel not in self.channels:
             raise KeyError(f"no channel {channel!r}; there are {', '.join(self.channels)}.")
         return self.channels[channel]
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` of the channels by `time` [s]; needs the extra `frames`."""
+        return to_frame(self.times, self.channels)
+
+    def to_xarray(self) -> Any:
+        """An `xarray.Dataset` of the channels over `time` [s] with their units; extra `frames`."""
+        return to_dataset(self.times, self.channels)
+
+    @classmethod
+    def from_pandas(cls, frame: Any, source: str = "DataFrame") -> "Recording":
+        """The recording in a DataFrame of channels in SI units; raises `ValueError` or `RecordingError`."""
+        return cls(*from_frame(frame), source=source)
+
+    @classmethod
+    def from_xarray(cls, dataset: Any, source: str = "Dataset") -> "Recording":
+        """The recording in a Dataset of channels in SI units; raises `ValueError` or `RecordingError`."""
+        return cls(*from_dataset(dataset), source=source)
 
     @property
     def sample_time(self) -> float:

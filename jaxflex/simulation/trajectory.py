@@ -1,5 +1,8 @@
 """The result of a simulation: named channels, how the solver fared, and whether to trust it."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -7,6 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
 from ..sensors import unit
+from .frames import from_dataset, from_frame, to_dataset, to_frame
 from .plant import State
 
 OK, STEPS_EXHAUSTED, STEP_TOO_SMALL, DIVERGED = 0, 1, 2, 3
@@ -28,14 +32,15 @@ class Trajectory(eqx.Module):
     - `times` [s], shape `(times,)`
     - `channels`: name to array `(times,)`; `trajectory["angle_1"]` for short, and
       `trajectory.unit("angle_1")` for its unit. A member that failed holds NaN.
-    - `state`: coordinates, rates, currents and controller memory at `times`
+    - `state`: coordinates, rates, currents and controller memory at `times`; None in a
+      trajectory that was made of its channels
     - `status`: 0 where the simulation succeeded, else a key of `REASONS`
     - `steps`, `rejected`: numbers of solver steps
     """
 
     times: Float[Array, "*batch times"]
     channels: dict[str, Float[Array, "*batch times"]]
-    state: State
+    state: State | None
     status: Int[Array, "*batch"]
     steps: Int[Array, "*batch"]
     rejected: Int[Array, "*batch"]
@@ -64,6 +69,38 @@ class Trajectory(eqx.Module):
     def tip(self) -> Float[Array, "*batch times 2"]:
         """Position of the payload [m] in the base frame, x and y last."""
         return jnp.stack([self["tip_x"], self["tip_y"]], axis=-1)
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` of the channels by `time` [s], and by `member` under `vmap`; extra `frames`."""
+        return to_frame(self.times, self.channels)
+
+    def to_xarray(self) -> Any:
+        """An `xarray.Dataset` of the channels over `time` [s] with their units; extra `frames`."""
+        return to_dataset(self.times, self.channels)
+
+    @classmethod
+    def from_pandas(cls, frame: Any) -> "Trajectory":
+        """The trajectory in a DataFrame that `to_pandas` made, or one like it; raises `ValueError`."""
+        return cls.from_channels(*from_frame(frame))
+
+    @classmethod
+    def from_xarray(cls, dataset: Any) -> "Trajectory":
+        """The trajectory in a Dataset that `to_xarray` made, or one like it; raises `ValueError`."""
+        return cls.from_channels(*from_dataset(dataset))
+
+    @classmethod
+    def from_channels(cls, times: Any, channels: Mapping[str, Any]) -> "Trajectory":
+        """A trajectory of given `times` [s] and `channels`, each `(*batch, times)`, without states.
+
+        A member that holds NaN counts as failed.
+        """
+        times = jnp.asarray(times)
+        given = {name: jnp.asarray(values) for name, values in channels.items()}
+        whole = jnp.ones(times.shape[:-1], bool)
+        for values in given.values():
+            whole = whole & jnp.isfinite(values).all(axis=-1)
+        none = jnp.zeros(times.shape[:-1], int)
+        return cls(times, given, None, jnp.where(whole, OK, DIVERGED), none, none)
 
     def check(self) -> "Trajectory":
         """The trajectory itself if every member succeeded.
