@@ -1,4 +1,4 @@
-"""Steps that treat the elastic links and the windings implicitly, all else explicitly.
+"""Steps that treat elastic links, windings and what holds a joint implicitly, all else explicitly.
 
 The fastest rates of an arm are those of its highest modes and windings. They are no part of
 the motion that is wanted, but hold an explicit method to steps of a fraction of their
@@ -8,6 +8,7 @@ whatever matrix stands in for the Jacobian. With
 
     J = [[0, 1], [-M^-1 K, -M^-1 D]] for the arm, -R/L for the windings
 
+K and D with the slopes of drives, controller and friction at each joint on their diagonal,
 a stage costs one right-hand side and one more solve of the size of M. The coefficients are
 those of ROS34PW2 (Rang and Angermann 2005): four stages, order 3, stiffly accurate.
 """
@@ -20,11 +21,11 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from ..drive import has_current_state
+from ..drive import effect_torques, has_current_state, joint_effects
 from ..dynamics.lagrange import inertia
 from ..dynamics.ldl import factorised, substitute
 from ..scalars import Scalar, dot
-from .plant import Plant, State, derivative
+from .plant import Plant, State, derivative, within
 
 _GAMMA = 0.435866521508459
 _ALPHA = np.array(
@@ -44,7 +45,8 @@ _COUPLING = np.array(
     ]
 )
 _WEIGHTS = np.array([0.2421238070609535, -1.2232505839045147, 1.545260255335102, _GAMMA])
-# in the unknowns u = Gamma k, which spare the products with J (Hairer and Wanner 1996, IV.7)
+# in the unknowns u = Gamma k / h, which spare the products with J (Hairer and Wanner 1996, IV.7)
+# and are finite where h is zero
 _A = _ALPHA @ np.linalg.inv(_COUPLING)
 _C = np.eye(4) / _GAMMA - np.linalg.inv(_COUPLING)
 _M = _WEIGHTS @ np.linalg.inv(_COUPLING)
@@ -59,17 +61,17 @@ class LinearlyImplicit(eqx.Module):
     """
 
 
-def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: State) -> State:
-    """One step of `h` [s] from `t`, nothing seen of what happens after `before`."""
+def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: State) -> State:
+    """One step of `h` [s] from `t`, of whose input only what is within `seen` is read."""
     model = plant.model
     mass = inertia(model, state.q)
     held_by, slowed_by = _joint_slopes(plant, t, state)
     stiffness = tuple(k + c for k, c in zip(model.stiffness(), held_by, strict=True))
     damping = tuple(d + c for d, c in zip(model.damping(), slowed_by, strict=True))
     g = h * _GAMMA
-    # M / g + D + g K
+    # M + g D + g^2 K
     shifted = [
-        [value / g + (damping[i] + g * stiffness[i] if i == j else 0.0) for j, value in enumerate(row)]
+        [value + (g * (damping[i] + g * stiffness[i]) if i == j else 0.0) for j, value in enumerate(row)]
         for i, row in enumerate(mass)
     ]
     # its inverse, once a step: rows times a vector are independent of one another, which XLA fuses
@@ -86,15 +88,17 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
     )
 
     def solved(r: State) -> State:
-        """`u` with `(1 / g - J) u = r`."""
-        # M r / g = (shifted - D - g K) r, so M itself is not needed
+        """`u` with `(1 / gamma - h J) u = r`."""
+        # M r = (shifted - g D - g^2 K) r, so M itself is not needed
         pull = tuple(
             (d + g * k) * v + k * x for d, k, x, v in zip(damping, stiffness, r.q, r.qd, strict=True)
         )
-        rates = tuple(g * (v - dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
-        moved = tuple(g * (x + v) for x, v in zip(r.q, rates, strict=True))
-        rest = jtu.tree_map(lambda x: g * x, r)
-        current = r.current and tuple(x / (1 / g + d) for x, d in zip(r.current, decays, strict=True))
+        rates = tuple(_GAMMA * (v - g * dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
+        moved = tuple(_GAMMA * (x + h * v) for x, v in zip(r.q, rates, strict=True))
+        rest = jtu.tree_map(lambda x: _GAMMA * x, r)
+        current = r.current and tuple(
+            x / (1 / _GAMMA + h * d) for x, d in zip(r.current, decays, strict=True)
+        )
         return rest._replace(q=moved, qd=rates, current=current)
 
     def combined(base: State, weights, stages: tuple[State, ...]) -> State:
@@ -107,9 +111,8 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
         # a scan, so that one program serves the four stages
         number, ahead, a, c = given
         now = t + ahead * h
-        seen = now - jax.lax.stop_gradient(jnp.maximum(now - before, 0.0))
-        slope = derivative(seen, combined(state, tuple(a), stages), plant)
-        found = solved(combined(slope, tuple(c / h), stages))
+        slope = derivative(within(seen, now), combined(state, tuple(a * h), stages), plant)
+        found = solved(combined(slope, tuple(c), stages))
         return tuple(
             jtu.tree_map(partial(jnp.where, number == i), found, old) for i, old in enumerate(stages)
         ), None
@@ -117,17 +120,18 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
     none = (jtu.tree_map(jnp.zeros_like, state),) * 4
     given = (jnp.arange(4), jnp.asarray(_TIMES), jnp.asarray(_A), jnp.asarray(_C))
     stages, _ = jax.lax.scan(stage, none, given)
-    return combined(state, tuple(_M), stages)
+    return combined(state, tuple(_M * h), stages)
 
 
 def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
-    """How drives and controller hold each joint, `-d torque / d angle`, and slow it, `- / d rate`."""
+    """How drives, controller and friction hold each joint, `-d torque / d angle`, and slow it, `- / d rate`."""
     joints = len(plant.model.joints)
 
     def torque(i, angle, rate):
         q = (*state.q[:i], angle, *state.q[i + 1 :])
         qd = (*state.qd[:i], rate, *state.qd[i + 1 :])
-        return -plant.drives(t, state._replace(q=q, qd=qd)).torque[i]
+        felt = effect_torques(joint_effects(plant.model), q[:joints], qd[:joints], t)[i]
+        return -plant.drives(t, state._replace(q=q, qd=qd)).torque[i] - felt
 
     pairs = [jax.grad(torque, (1, 2))(i, state.q[i], state.qd[i]) for i in range(joints)]
     none = (jnp.zeros_like(t),) * (plant.model.size - joints)

@@ -17,11 +17,12 @@ from ..effects import AbstractSensorEffect
 from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
+from .exact import Exact, exact, require_linear, suits
 from .march import march
 from .methods import AbstractMethod, Adaptive, Fixed, SampleAndHold, sample
 from .plant import Plant, State, derivative
 from .stiffness import fastest_rate
-from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
+from .trajectory import DIVERGED, INPUT_UNFIT, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
 
 
 class InitialState(eqx.Module):
@@ -63,8 +64,15 @@ def simulate(
     - `disturbance`: torques [N m] on the joints beside the motors.
     - `sample_time` [s]: the controller computes a command this often and holds it in
       between; None for the controller's own `period`, or continuous control if it has none.
-    - `method`: `Adaptive(rtol, atol, solver)` (default, 1e-6) or `Fixed(dt, solver)`.
-      Either steps to every jump of reference and disturbance and to every sample.
+    - `method`: `Exact()`, `Adaptive(rtol, atol, solver)` or `Fixed(dt, solver)`; the latter two
+      step to every jump of reference and disturbance and to every sample. By default:
+
+      | loop, by its structure | method |
+      |---|---|
+      | linear, its input polynomial between jumps | `Exact()` |
+      | anything else, sampled control included | `Adaptive()`, an error of 1e-6 |
+
+      `docs/choose.md` says which others are faster where, as measured.
     - `channels`: names of those wanted; all by default. Fewer compile faster.
     - `max_steps`: after which the simulation has failed.
     - `adjoint`: one of diffrax's, to fix how the solve is differentiated; by default
@@ -86,7 +94,10 @@ def simulate(
     if disturbance is not None:
         _check_joints(plant, disturbance, "disturbance")
     start = initial_state(plant, initial or InitialState())
-    method = Adaptive() if method is None else method
+    if method is None:
+        method = Exact() if suits(plant, start) else Adaptive()
+    elif isinstance(method, Exact):
+        require_linear(plant, start)
     wanted = _wanted(plant, channels)
     inputs = (plant, start, times, method, wanted, max_steps, adjoint)
     if any(isinstance(leaf, Tracer) for leaf in jtu.tree_leaves(inputs)):
@@ -173,6 +184,15 @@ def _march(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
     return states, outcome, steps, jnp.zeros_like(steps)
 
 
+def _exact(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
+    """The same of a linear loop, without steps."""
+    plant, start, times, _ = inputs
+    backwards = not isinstance(adjoint, diffrax.ForwardMode)
+    states, pieces, fits = exact(plant, start, times, _jumps(plant), backwards)
+    outcome = jnp.select([~fits, pieces > max_steps], [INPUT_UNFIT, STEPS_EXHAUSTED], OK)
+    return states, outcome, pieces, jnp.zeros_like(pieces)
+
+
 def _solve(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
     """The same by a solver of diffrax."""
     plant, start, times, method = inputs
@@ -221,7 +241,8 @@ def _integrate(
 ) -> Trajectory:
     inputs = (plant, start, times, method)
     marching = isinstance(method, Fixed) and method.marches(plant.sample_time is not None)
-    solve = partial(_march if marching else _solve, max_steps=max_steps)
+    way = _exact if isinstance(method, Exact) else _march if marching else _solve
+    solve = partial(way, max_steps=max_steps)
     if adjoint is None:
         differentiable = both_modes(
             lambda x: solve(x, diffrax.ForwardMode()),
