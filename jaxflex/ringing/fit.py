@@ -1,7 +1,9 @@
 """Modes fitted to stretches of data: least squares in the poles, with all amplitudes eliminated.
 
 Every channel of every stretch is an offset and a drift, decaying waves of each mode, and,
-where it is driven, each mode's answer to each input. All but the poles enter linearly and
+where it is driven, each input itself and each mode's answer to it. The input itself makes
+up for whether it was held between samples, for delays of less than a sample, and for what
+follows it at once, as an acceleration does. All but the poles enter linearly and
 are solved for at each set of poles (variable projection, Golub and Pereyra 1973). Under
 white noise this is maximum likelihood, and its covariance that of Cramer and Rao; noise
 with a memory widens it.
@@ -15,7 +17,8 @@ from scipy.signal import lfilter
 
 from .stretches import Stretch
 
-MOST = 20_000  # samples used in all; longer stretches are thinned
+MOST = 20_000  # samples used in all; of longer stretches every n-th
+CLEAN = 1e-4  # share of the variance below which nothing is told from noise
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class Fit:
     """Modes: `frequency` [Hz] (undamped), `damping_ratio`, their `covariance` in the order f_1, zeta_1, f_2, ….
 
     `size`: the largest part of each mode in any channel, as a share of all that is seen;
-    `explained`: the share of the variance.
+    `explained`: the share of the variance; `misfit`: what is left, as a multiple of the noise; `samples`
+    fitted, and parameters `added` by each mode.
     """
 
     frequency: np.ndarray
@@ -31,6 +35,14 @@ class Fit:
     covariance: np.ndarray
     size: np.ndarray
     explained: float
+    misfit: float
+    samples: int
+    added: int
+
+    @property
+    def modes(self) -> np.ndarray:
+        """Frequencies and damping ratios in a row: f_1, zeta_1, f_2, …."""
+        return np.column_stack([self.frequency, self.damping_ratio]).ravel()
 
     @property
     def frequency_std(self) -> np.ndarray:
@@ -49,38 +61,42 @@ def poles_of(modes: np.ndarray) -> np.ndarray:
     return omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
 
 
-def columns(stretch: Stretch, poles: np.ndarray) -> np.ndarray:
-    """What every channel is made of: `(times, columns)`, the waves of a pole side by side."""
+def columns(stretch: Stretch, poles: np.ndarray, every: int = 1) -> np.ndarray:
+    """What every channel is made of at `every` n-th sample: `(times, columns)`, the waves of a pole side by side."""
     t = stretch.times
-    parts = [np.ones_like(t), t / t[-1]]
+    drives = stretch.inputs - stretch.inputs[:, :1]
+    parts = [np.ones_like(t), t / t[-1], *drives]
     for pole in poles:
-        waves = [np.exp(pole * t)]
+        waves = [np.exp(pole * (t - t[-1] if np.real(pole) > 0 else t))]
         turn = np.exp(pole * stretch.step)
-        for drive in stretch.inputs:
-            held = (turn - 1) / pole * np.concatenate([[0.0], (drive - drive[0])[:-1]])
+        for drive in drives:
+            held = (turn - 1) / pole * np.concatenate([[0.0], drive[:-1]])
             waves.append(lfilter([1.0], [1.0, -turn], held))
         for wave in waves:
             parts.append(wave.real)
             if np.imag(pole):
                 parts.append(wave.imag)
-    return np.stack(parts, axis=1)
+    return np.stack([part[::every] for part in parts], axis=1)
 
 
 def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> Fit:
     """The modes nearest to `start` (f_1, zeta_1, …) that fit best, with `real` poles [rad/s] beside them."""
-    thinned = [_thin(s, MOST // len(stretches)) for s in stretches]
-    targets = [_scaled(s, stretches) for s in thinned]
+    every = sparse(stretches, MOST)
+    targets = [y[:, ::n] for y, n in zip(scaled(stretches), every, strict=True)]
     count = len(start)
 
     def residuals(x):
         poles = np.concatenate([poles_of(x[:count]), -np.exp(x[count:]).astype(complex)])
         return np.concatenate(
-            [_left(columns(s, poles), y).ravel() for s, y in zip(thinned, targets, strict=True)]
+            [_left(columns(s, poles, n), y).ravel() for s, y, n in zip(stretches, targets, every, strict=True)]
         )
 
     first = np.concatenate([start, np.log(np.maximum(-real, 1e-6))])
-    low = np.concatenate([np.tile([1e-6, -0.2], count // 2), np.full(len(real), -14.0)])
-    high = np.concatenate([np.tile([np.inf, 0.95], count // 2), np.full(len(real), 14.0)])
+    longest = max(s.times[-1] for s in stretches)
+    growth = np.maximum(-0.2, -10 / (2 * np.pi * start[0::2] * longest))
+    slowest = np.column_stack([np.full(count // 2, 1e-6), growth]).ravel()
+    low = np.concatenate([slowest, np.full(len(real), -14.0)])
+    high = np.concatenate([np.tile([0.5 / stretches[0].step, 0.95], count // 2), np.full(len(real), 14.0)])
     scale = np.concatenate(
         [np.column_stack([start[0::2], np.full(count // 2, 0.05)]).ravel(), np.ones(len(real))]
     )
@@ -88,7 +104,8 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
         residuals, np.clip(first, low + 1e-9, high - 1e-9), bounds=(low, high), x_scale=scale, max_nfev=60
     )
     samples = len(found.fun)
-    linear = sum(columns(s, poles_of(found.x[:count])).shape[1] * len(s.outputs) for s in thinned)
+    width = [2 + len(s.inputs) + (count + len(real)) * (1 + len(s.inputs)) for s in stretches]
+    linear = sum(wide * len(s.outputs) for wide, s in zip(width, stretches, strict=True))
     variance = found.fun @ found.fun / max(samples - linear - len(found.x), 1)
     information = found.jac.T @ found.jac
     covariance = _memory(found.fun) * variance * np.linalg.pinv(information)
@@ -96,23 +113,20 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     modes = found.x[:count]
     sizes = sizes_of(stretches, poles_of(modes), -np.exp(found.x[count:]))
     explained = 1 - float(found.fun @ found.fun) / max(total, 1e-300)
-    return Fit(modes[0::2], modes[1::2], covariance[:count, :count], sizes, explained)
+    misfit = variance / max(_noise(stretches), CLEAN * total / samples, 1e-300)
+    added = 2 + sum(2 * (1 + len(s.inputs)) * len(s.outputs) for s in stretches)
+    return Fit(modes[0::2], modes[1::2], covariance[:count, :count], sizes, explained, misfit, samples, added)
 
 
-def _thin(stretch: Stretch, most: int) -> Stretch:
-    """Every n-th sample of a free decay, so that at most `most` numbers are left; a driven one as it is."""
-    every = -(-stretch.outputs.size // most)
-    if every == 1 or len(stretch.inputs):
-        return stretch
-    return Stretch(
-        stretch.step * every, stretch.outputs[:, ::every], stretch.inputs, stretch.channels, stretch.origin
-    )
+def sparse(stretches: list[Stretch], most: int) -> list[int]:
+    """Of each stretch every how manieth sample to take, so that they have at most `most` numbers in all."""
+    return [-(-s.outputs.size * len(stretches) // most) for s in stretches]
 
 
-def _scaled(stretch: Stretch, of: list[Stretch]) -> np.ndarray:
+def scaled(stretches: list[Stretch]) -> list[np.ndarray]:
     """Outputs in units of the largest deviation that each channel has in any of the stretches."""
-    deviation = np.max([np.std(s.outputs, axis=1) for s in of], axis=0)[:, None]
-    return stretch.outputs / np.maximum(deviation, 1e-300)
+    deviation = np.max([np.std(s.outputs, axis=1) for s in stretches], axis=0)[:, None]
+    return [s.outputs / np.maximum(deviation, 1e-300) for s in stretches]
 
 
 def _left(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -123,17 +137,31 @@ def _left(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
 def sizes_of(stretches: list[Stretch], modes: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Largest excursion of each mode's part in any channel, as a share of the data's own."""
     sizes = np.zeros(len(modes))
-    for stretch in (_thin(s, MOST // len(stretches)) for s in stretches):
-        y = _scaled(stretch, stretches)
-        basis = columns(stretch, np.concatenate([modes, real]))
+    for stretch, whole, every in zip(stretches, scaled(stretches), sparse(stretches, MOST), strict=True):
+        y = whole[:, ::every]
+        basis = columns(stretch, np.concatenate([modes, real]), every)
+        basis = basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
         weights = np.linalg.lstsq(basis, y.T, rcond=1e-12)[0]
-        width = 2 * (1 + len(stretch.inputs))
+        first, width = 2 + len(stretch.inputs), 2 * (1 + len(stretch.inputs))
         span = np.maximum(np.ptp(y, axis=1), 1e-300)
         for k in range(len(modes)):
-            own = slice(2 + k * width, 2 + (k + 1) * width)
+            own = slice(first + k * width, first + (k + 1) * width)
             part = basis[:, own] @ weights[own]
             sizes[k] = max(sizes[k], float(np.max(np.ptp(part, axis=0) / span)))
     return sizes
+
+
+def _noise(stretches: list[Stretch]) -> float:
+    """Variance of white noise: its power in the upper half of the band, where nothing should ring."""
+    powers, counts = [], []
+    for stretch, y in zip(stretches, scaled(stretches), strict=True):
+        window = np.hanning(y.shape[1])
+        centred = y - y.mean(axis=1, keepdims=True)
+        power = np.abs(np.fft.rfft(centred * window, axis=1)) ** 2 / np.sum(window**2)
+        # the median of a power that is exponentially distributed is log 2 of its mean
+        powers.append(np.median(power[:, power.shape[1] // 2 :], axis=1).mean() / np.log(2))
+        counts.append(len(stretch.times))
+    return float(np.average(powers, weights=counts))
 
 
 def _memory(residual: np.ndarray) -> float:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..files.recording import Recording, RecordingError
-from .fit import Fit, fit_modes, poles_of, sizes_of
+from .choose import least_gain, next_pole
+from .fit import Fit, fit_modes, poles_of
 from .poles import first_poles
 from .stretches import Stretch, stretches
 
@@ -80,28 +81,41 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
     alone = (np.abs(np.imag(poles)) < 1e-9) & (np.real(poles) < -0.5 / longest)
     real = np.real(poles)[alone & (np.real(poles) > -nyquist / 3)]
     slow = real[np.argsort(-real)][:2] if len(found[0].inputs) else real[:0]
-    candidates = poles[rings]
-    if not len(candidates):
+    fit = _grown(found, poles[rings], slow)
+    if fit is None:
         raise RecordingError(
             f"{source}: nothing rings: no mode with a damping ratio below {RINGS:g} was found; record a "
             "longer decay, or excite the arm more."
         )
-    start = np.column_stack([np.abs(candidates) / (2 * np.pi), np.clip(damping[rings], 1e-4, 0.9)])
-    likely = np.argsort(-sizes_of(found, poles_of(start.ravel()), slow))[: MODES + 2]
-    fit = fit_modes(found, start[likely].ravel(), slow)
     for _ in range(2 * MODES):
         keep = _worth(fit)
         if keep.all():
             break
         if not keep.any():
             raise RecordingError(f"{source}: nothing rings above the noise; excite the arm more.")
-        kept = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)])[keep]
-        fit = fit_modes(found, kept.ravel(), slow)
+        fit = fit_modes(found, fit.modes.reshape(-1, 2)[keep].ravel(), slow)
     if fit.explained < HEARD:
         raise RecordingError(
             f"{source}: nothing rings above the noise: modes explain {100 * fit.explained:.0f} % of the "
             f"motion, at least {100 * HEARD:.0f} % are needed; excite the arm more."
         )
+    return fit
+
+
+def _grown(found: list[Stretch], candidates: np.ndarray, slow: np.ndarray) -> Fit | None:
+    """A mode more at a time, each fitted together with those before, as long as they explain more than noise."""
+    fit = None
+    while fit is None or len(fit.frequency) < MODES + 2:
+        there = slow if fit is None else np.concatenate([slow, poles_of(fit.modes)])
+        pole = next_pole(found, candidates, there)
+        if not len(pole):
+            break
+        more = np.array([np.abs(pole[0]) / (2 * np.pi), -np.real(pole[0]) / np.abs(pole[0])])
+        more = np.concatenate([[] if fit is None else fit.modes, more])
+        grown = fit_modes(found, more, slow)
+        if fit is not None and 1 - grown.misfit / fit.misfit < least_gain(grown.added, grown.samples):
+            break
+        fit = grown
     return fit
 
 
