@@ -25,8 +25,8 @@ CLEAN = 1e-4  # share of the variance below which nothing is told from noise
 class Fit:
     """Modes: `frequency` [Hz] (undamped), `damping_ratio`, their `covariance` in the order f_1, zeta_1, f_2, ….
 
-    `size`: the largest part of each mode in any channel, as a share of all that is seen;
-    `explained`: the share of the variance; `misfit`: what is left, as a multiple of the noise; `samples`
+    `size`: the largest part of each mode in any channel, as a share of all that is seen; `ringing`: of a
+    driven run, the mode's share of all ringing after a step of the input; else the size. `explained`: the share of the variance; `misfit`: what is left, as a multiple of the noise; `samples`
     fitted, and parameters `added` by each mode.
     """
 
@@ -34,6 +34,7 @@ class Fit:
     damping_ratio: np.ndarray
     covariance: np.ndarray
     size: np.ndarray
+    ringing: np.ndarray
     explained: float
     misfit: float
     samples: int
@@ -111,11 +112,11 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     covariance = _memory(found.fun) * variance * np.linalg.pinv(information)
     total = sum(float(np.sum((y - y.mean(axis=1, keepdims=True)) ** 2)) for y in targets)
     modes = found.x[:count]
-    sizes = sizes_of(stretches, poles_of(modes), -np.exp(found.x[count:]))
+    sizes, rings = sizes_of(stretches, poles_of(modes), -np.exp(found.x[count:]))
     explained = 1 - float(found.fun @ found.fun) / max(total, 1e-300)
     misfit = variance / max(_noise(stretches), CLEAN * total / samples, 1e-300)
     added = 2 + sum(2 * (1 + len(s.inputs)) * len(s.outputs) for s in stretches)
-    return Fit(modes[0::2], modes[1::2], covariance[:count, :count], sizes, explained, misfit, samples, added)
+    return Fit(modes[0::2], modes[1::2], covariance[:count, :count], sizes, rings, explained, misfit, samples, added)
 
 
 def sparse(stretches: list[Stretch], most: int) -> list[int]:
@@ -134,21 +135,24 @@ def _left(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
     return y - (y @ q) @ q.T
 
 
-def sizes_of(stretches: list[Stretch], modes: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Largest excursion of each mode's part in any channel, as a share of the data's own."""
-    sizes = np.zeros(len(modes))
+def sizes_of(stretches: list[Stretch], modes: np.ndarray, real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each mode the largest excursion in any channel, as a share of the data's own, and its share of a ringing."""
+    sizes, rings = np.zeros(len(modes)), np.zeros(len(modes))
     for stretch, whole, every in zip(stretches, scaled(stretches), sparse(stretches, MOST), strict=True):
         y = whole[:, ::every]
         basis = columns(stretch, np.concatenate([modes, real]), every)
-        basis = basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
-        weights = np.linalg.lstsq(basis, y.T, rcond=1e-12)[0]
+        lengths = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+        weights = np.linalg.lstsq(basis / lengths, y.T, rcond=1e-12)[0] / lengths[:, None]
         first, width = 2 + len(stretch.inputs), 2 * (1 + len(stretch.inputs))
         span = np.maximum(np.ptp(y, axis=1), 1e-300)
         for k in range(len(modes)):
             own = slice(first + k * width, first + (k + 1) * width)
             part = basis[:, own] @ weights[own]
             sizes[k] = max(sizes[k], float(np.max(np.ptp(part, axis=0) / span)))
-    return sizes
+            # a step makes a wave of 1 / |pole| of each input's
+            waves = np.hypot(weights[own][2::2], weights[own][3::2]) / np.abs(modes[k])
+            rings[k] = max(rings[k], float(np.max(waves, initial=0.0)))
+    return sizes, rings / rings.sum() if rings.any() else sizes
 
 
 def _noise(stretches: list[Stretch]) -> float:

@@ -9,12 +9,15 @@ from ..files.recording import Recording, RecordingError
 from .choose import least_gain, next_pole
 from .fit import Fit, fit_modes, poles_of
 from .poles import first_poles
-from .stretches import Stretch, stretches
+from .stretches import DRIVES, INPUTS, Stretch, later, live, possible_inputs, stretches
 
 MODES = 4  # of a recording, at most
 SMALL = 0.02  # share of the motion below which a mode is left out
 RINGS = 0.6  # damping ratio above which nothing rings
 SIGMAS = 2.0  # standard deviations that a spread reaches to either side
+MET, MISFIT = 1.5, 3.0  # times the noise: up to the first no more is left than noise, from the second on more is
+WELL = 0.9  # share of the variance from which on the modes are believed to be all there is
+LATER = (0.25, 1.0, 4.0)  # cycles after which a decay may begin in earnest
 HEARD = 0.1  # share of the variance that the modes have to explain
 SAME = 0.25  # relative difference in frequency within which modes of two recordings are the same
 
@@ -25,7 +28,8 @@ class MeasuredMode:
 
     `frequency` [Hz] is the undamped one; `frequency_range`, `damping_range` hold every
     recording's estimate with two standard deviations to either side; `size` is the
-    largest excursion of the mode as a share of all motion of its channel.
+    largest excursion of the mode as a share of all motion of its channel; of a run that is driven
+    throughout, the mode's share of all ringing after a step of the input.
     """
 
     frequency: float
@@ -48,26 +52,80 @@ class MeasuredModes:
     stretches: tuple[Stretch, ...]
 
 
-def measure_modes(recordings: Sequence[Recording]) -> MeasuredModes:
+def measure_modes(recordings: Sequence[Recording], driven_by: str | None = None) -> MeasuredModes:
     """Frequencies and damping ratios of all modes that ring in `recordings`.
 
     Strain, tip deflection and tip acceleration are looked at; all such channels of a
-    recording share their modes. Free decays are fitted as such, runs that are driven
-    throughout together with their input; see `stretches`.
+    recording share their modes. Where the input stands still the free decay is fitted,
+    else output and input together. `driven_by` says which kind of channel is the input
+    (`reference`, `voltage`, `torque`, `current`, `angle`), and so what the modes are of:
+    the closed loop, the arm moved by its drive, the links with the joint's motion given.
+    Without it the reference is, where it is recorded; else the drive; and the angle where
+    the drive explains little. A recording that shows none is left out, with a word.
 
-    **Raises** `RecordingError` where a recording shows no vibration.
+    **Raises** `RecordingError` where no recording shows vibration, or one has no such input.
     """
-    fits, parts, warnings, used = [], [], [], []
+    if driven_by is not None and driven_by not in INPUTS:
+        raise RecordingError(f"driven_by = {driven_by!r} is unknown; allowed are {', '.join(INPUTS)}.")
+    fits, parts, warnings, used, silent = [], [], [], [], []
     for recording in recordings:
         warnings += [f"{recording.source}: {repair}" for repair in recording.repairs]
-        found = stretches(recording)
-        fit = _modes_of(found, recording.source)
+        try:
+            found, fit, kind = _best(recording, driven_by)
+        except RecordingError as error:
+            silent.append(error)
+            continue
         fits.append(fit)
         parts += found
-        warnings += _doubts(found, fit, recording.source)
+        warnings += _doubts(found, fit, recording.source, kind)
         used.append(_said(found, recording.source))
+    if not fits:
+        raise silent[0]
+    warnings += [f"left out: {error}" for error in silent]
     modes, apart = _gathered(fits)
     return MeasuredModes(tuple(modes), tuple(warnings + apart), tuple(used), tuple(parts))
+
+
+def _best(recording: Recording, driven_by: str | None) -> tuple[list[Stretch], Fit, str | None]:
+    """Stretches, modes and the kind of input, of those that may be the one that explains enough first."""
+    if driven_by is not None and not live(recording, (driven_by,)):
+        raise RecordingError(
+            f"{recording.source}: no channel {driven_by}_1 that changes; found {', '.join(recording.channels)}."
+        )
+    kinds = possible_inputs(recording) if driven_by is None else [driven_by]
+    best, failure = None, None
+    for kind in kinds:
+        try:
+            found = stretches(recording, kind)
+            found, fit = _from_the_start(found, recording.source)
+        except RecordingError as error:
+            failure = failure or error
+            continue
+        if best is None or fit.misfit < best[1].misfit:
+            best = found, fit, kind
+        if fit.explained > WELL:
+            break
+    if best is None:
+        raise failure or RecordingError(f"{recording.source}: nothing rings.")
+    return best
+
+
+def _from_the_start(found: list[Stretch], source: str) -> tuple[list[Stretch], Fit]:
+    """The modes; of free decays, if something else is seen to go on at first, from some cycles later on."""
+    fit = _modes_of(found, source)
+    if fit.misfit < MET or fit.explained < 0.5 or len(found[0].inputs):
+        return found, fit
+    for cycles in LATER:
+        rest = later(found, cycles)
+        if not rest:
+            break
+        try:
+            after = _modes_of(rest, source)
+        except RecordingError:
+            break
+        if after.misfit < MET and after.explained > WELL:
+            return rest, after
+    return found, fit
 
 
 def _modes_of(found: list[Stretch], source: str) -> Fit:
@@ -138,10 +196,10 @@ def _worth(fit: Fit) -> np.ndarray:
     return np.arange(len(sizes)) != worst
 
 
-def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
-    """What to think twice about: few cycles, slow sampling, noise, and damping that changes with size."""
+def _doubts(found: list[Stretch], fit: Fit, source: str, kind: str | None) -> list[str]:
+    """What to think twice about: few cycles, slow sampling, noise, the input, damping that changes with size."""
     said = []
-    first = int(np.argmax(fit.size))
+    first = int(np.argmax(fit.ringing))
     f = fit.frequency[first]
     cycles = f * max(s.times[-1] for s in found)
     if cycles < 5:
@@ -151,7 +209,7 @@ def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
     per_cycle = 1 / (f * found[0].step)
     if per_cycle < 8:
         said.append(f"{source}: only {per_cycle:.1f} samples a cycle at {f:.3g} Hz; sample faster.")
-    if fit.explained < 0.9:
+    if fit.explained < WELL:
         said.append(
             f"{source}: {100 * fit.explained:.0f} % of the motion is that of its modes; the rest is noise, "
             "friction or another disturbance."
@@ -165,7 +223,25 @@ def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
         said.append(
             f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
         )
-    return said + _changes(found, fit, source, first)
+    if len(found[0].inputs) and kind in DRIVES:
+        said.append(
+            f"{source}: no reference is recorded, so these are the modes of the arm moved by its drive "
+            f"({kind}); a position loop around it changes them. Record reference_1 to have the loop's own, or "
+            "take them from the model (jaxflex shaper ARM)."
+        )
+    if len(found[0].inputs) and kind == "angle":
+        said.append(
+            f"{source}: these are the modes of the links with the joint's angle given: those that ring if the "
+            "joint is held stiffly. Record reference_1 to have those of the loop as it is."
+        )
+    changes = _changes(found, fit, source, first)
+    if fit.misfit > MISFIT and not len(found[0].inputs) and not changes:
+        said.append(
+            f"{source}: what rings does not die out as a free vibration does (what is left is "
+            f"{np.sqrt(fit.misfit):.0f} times the noise): it rubs, or something that is not recorded drives it. "
+            "Record reference_1 with it, or a decay after all has stopped."
+        )
+    return said + changes
 
 
 def _changes(found: list[Stretch], fit: Fit, source: str, first: int) -> list[str]:
@@ -207,7 +283,7 @@ def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
     """The modes of all recordings, those of like frequency as one, by falling size."""
     groups: list[list[tuple[Fit, int]]] = []
     order = sorted(
-        ((fit, k) for fit in fits for k in range(len(fit.frequency))), key=lambda p: -p[0].size[p[1]]
+        ((fit, k) for fit in fits for k in range(len(fit.frequency))), key=lambda p: -p[0].ringing[p[1]]
     )
     for fit, k in order:
         for group in groups:
@@ -231,7 +307,7 @@ def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
                 mean_f, std_f, max(mean_z, 0.0), std_z,
                 (float(np.min(f - SIGMAS * df)), float(np.max(f + SIGMAS * df))),
                 (float(max(np.min(z - SIGMAS * dz), 0.0)), float(max(np.max(z + SIGMAS * dz), 0.0))),
-                float(max(fit.size[k] for fit, k in group)), len(group),
+                float(max(fit.ringing[k] for fit, k in group)), len(group),
             )
         )  # fmt: skip
         if np.ptp(f) > 4 * np.max(df) and np.ptp(f) > 0.01 * mean_f:
