@@ -40,22 +40,29 @@ class Found(NamedTuple):
 
 
 def shaper(
-    files: Sequence[Path], payloads: str | None, tolerance: float, json: Path | None, output: Path | None
+    files: Sequence[Path],
+    payloads: str | None,
+    driven_by: str | None,
+    tolerance: float,
+    json: Path | None,
+    output: Path | None,
 ) -> None:
     """Find the modes, rate the shapers, print, draw and write."""
     if not 0 < tolerance < 1:
         raise UsageError(f"--tolerance {tolerance:g}: allowed is more than 0 and less than 1.")
-    recordings = [file for file in files if file.suffix.lower() == ".csv"]
+    recordings = [file for file in files if file.suffix.lower() != ".toml"]
     if recordings and len(recordings) < len(files):
-        raise UsageError("an arm and recordings are given: one arm.toml, or recordings (.csv), are allowed.")
+        raise UsageError("an arm and recordings are given: one arm.toml, or recordings, are allowed.")
     if len(files) > 1 and not recordings:
-        raise UsageError(f"{len(files)} arms are given: one arm.toml, or recordings (.csv), are allowed.")
+        raise UsageError(f"{len(files)} arms are given: one arm.toml, or recordings, are allowed.")
+    if driven_by is not None and not recordings:
+        raise UsageError("--input: allowed with recordings only.")
     if recordings and payloads is not None:
         raise UsageError(
             "--payloads: allowed with an arm only; recordings show the payloads they were made with."
         )
     if recordings:
-        found = _from_recordings(recordings)
+        found = _from_recordings(recordings, driven_by)
     else:
         masses = None if payloads is None else parse_payloads(payloads)
         found = Found(*modes_of_arm(files[0] if files else None, masses, DRAWN))
@@ -74,8 +81,8 @@ def shaper(
     console.print(f"wrote report.html, shaper.toml, shaper.json and shaper.png to {folder}/", markup=False)
 
 
-def _from_recordings(paths: Sequence[Path]) -> Found:
-    measured = measure_modes([read_recording(path) for path in paths])
+def _from_recordings(paths: Sequence[Path], driven_by: str | None) -> Found:
+    measured = measure_modes([read_recording(path) for path in paths], driven_by)
     top = 1.3 * max([3 * measured.modes[0].frequency, *(mode.frequency for mode in measured.modes)])
     frequencies = np.linspace(0.0, top, DRAWN)
     spectrum = np.zeros(DRAWN)

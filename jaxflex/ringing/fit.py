@@ -86,13 +86,36 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     targets = [y[:, ::n] for y, n in zip(scaled(stretches), every, strict=True)]
     count = len(start)
 
+    def all_poles(x):
+        return np.concatenate([poles_of(x[:count]), -np.exp(x[count:]).astype(complex)])
+
     def residuals(x):
-        poles = np.concatenate([poles_of(x[:count]), -np.exp(x[count:]).astype(complex)])
+        poles = all_poles(x)
         return np.concatenate(
             [_left(columns(s, poles, n), y).ravel() for s, y, n in zip(stretches, targets, every, strict=True)]
         )
 
     first = np.concatenate([start, np.log(np.maximum(-real, 1e-6))])
+    def slopes(x):
+        """Of the residuals, but for what of them stays within the columns (Kaufman 1975)."""
+        steps = 1e-6 * np.maximum(np.abs(x), 1e-3)
+        rows = []
+        for stretch, y, n in zip(stretches, targets, every, strict=True):
+            basis = columns(stretch, all_poles(x), n)
+            weights = _weights(basis, y)
+            first, width = 2 + len(stretch.inputs), 1 + len(stretch.inputs)
+            parts = []
+            for i, step in enumerate(steps):
+                near = all_poles(x + step * (np.arange(len(x)) == i))
+                k = i // 2 if i < count else count // 2 + i - count
+                start = first + width * (2 * k if i < count else count + i - count)
+                own = slice(start, start + (2 * width if i < count else width))
+                moved = columns(stretch, near[k : k + 1], n)[:, first:] - basis[:, own]
+                parts.append(moved @ weights[own] / step)
+            left = _left(basis, np.concatenate(parts, axis=1).T).reshape(len(x), -1)
+            rows.append(-left.T)
+        return np.concatenate(rows)
+
     longest = max(s.times[-1] for s in stretches)
     growth = np.maximum(-0.2, -10 / (2 * np.pi * start[0::2] * longest))
     slowest = np.column_stack([np.full(count // 2, 1e-6), growth]).ravel()
@@ -102,7 +125,7 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
         [np.column_stack([start[0::2], np.full(count // 2, 0.05)]).ravel(), np.ones(len(real))]
     )
     found = least_squares(
-        residuals, np.clip(first, low + 1e-9, high - 1e-9), bounds=(low, high), x_scale=scale, max_nfev=60
+        residuals, np.clip(first, low + 1e-9, high - 1e-9), slopes, (low, high), x_scale=scale, max_nfev=60
     )
     samples = len(found.fun)
     width = [2 + len(s.inputs) + (count + len(real)) * (1 + len(s.inputs)) for s in stretches]
@@ -130,8 +153,17 @@ def scaled(stretches: list[Stretch]) -> list[np.ndarray]:
     return [s.outputs / np.maximum(deviation, 1e-300) for s in stretches]
 
 
+def _lengths(basis: np.ndarray) -> np.ndarray:
+    return np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+
+
+def _weights(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
+    lengths = _lengths(basis)
+    return np.linalg.lstsq(basis / lengths, y.T, rcond=1e-12)[0] / lengths[:, None]
+
+
 def _left(basis: np.ndarray, y: np.ndarray) -> np.ndarray:
-    q, _ = np.linalg.qr(basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300))
+    q, _ = np.linalg.qr(basis / _lengths(basis))
     return y - (y @ q) @ q.T
 
 
@@ -141,8 +173,7 @@ def sizes_of(stretches: list[Stretch], modes: np.ndarray, real: np.ndarray) -> t
     for stretch, whole, every in zip(stretches, scaled(stretches), sparse(stretches, MOST), strict=True):
         y = whole[:, ::every]
         basis = columns(stretch, np.concatenate([modes, real]), every)
-        lengths = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
-        weights = np.linalg.lstsq(basis / lengths, y.T, rcond=1e-12)[0] / lengths[:, None]
+        weights = _weights(basis, y)
         first, width = 2 + len(stretch.inputs), 2 * (1 + len(stretch.inputs))
         span = np.maximum(np.ptp(y, axis=1), 1e-300)
         for k in range(len(modes)):

@@ -9,7 +9,7 @@ from ..files.recording import Recording, RecordingError
 from .choose import least_gain, next_pole
 from .fit import Fit, fit_modes, poles_of
 from .poles import first_poles
-from .stretches import DRIVES, INPUTS, Stretch, later, live, possible_inputs, stretches
+from .stretches import DRIVES, INPUTS, Stretch, common_inputs, later, stretches
 
 MODES = 4  # of a recording, at most
 SMALL = 0.02  # share of the motion below which a mode is left out
@@ -67,47 +67,47 @@ def measure_modes(recordings: Sequence[Recording], driven_by: str | None = None)
     """
     if driven_by is not None and driven_by not in INPUTS:
         raise RecordingError(f"driven_by = {driven_by!r} is unknown; allowed are {', '.join(INPUTS)}.")
-    fits, parts, warnings, used, silent = [], [], [], [], []
-    for recording in recordings:
-        warnings += [f"{recording.source}: {repair}" for repair in recording.repairs]
-        try:
-            found, fit, kind = _best(recording, driven_by)
-        except RecordingError as error:
-            silent.append(error)
-            continue
-        fits.append(fit)
+    kinds = [driven_by] if driven_by else common_inputs(recordings)
+    best = min((_tried(recordings, kind) for kind in kinds), key=lambda trial: trial.doubt)
+    if not best.found:
+        raise best.silent[0]
+    warnings = [f"{recording.source}: {repair}" for recording in recordings for repair in recording.repairs]
+    if any(len(part.inputs) for _, found, _ in best.found for part in found):
+        warnings += _meant(best.kind)
+    used, parts = [], []
+    for source, found, fit in best.found:
+        warnings += _doubts(found, fit, source)
+        used.append(_said(found, source))
         parts += found
-        warnings += _doubts(found, fit, recording.source, kind)
-        used.append(_said(found, recording.source))
-    if not fits:
-        raise silent[0]
-    warnings += [f"left out: {error}" for error in silent]
-    modes, apart = _gathered(fits)
+    warnings += [f"left out: {error}" for error in best.silent]
+    modes, apart = _gathered([fit for _, _, fit in best.found])
     return MeasuredModes(tuple(modes), tuple(warnings + apart), tuple(used), tuple(parts))
 
 
-def _best(recording: Recording, driven_by: str | None) -> tuple[list[Stretch], Fit, str | None]:
-    """Stretches, modes and the kind of input, of those that may be the one that explains enough first."""
-    if driven_by is not None and not live(recording, (driven_by,)):
-        raise RecordingError(
-            f"{recording.source}: no channel {driven_by}_1 that changes; found {', '.join(recording.channels)}."
-        )
-    kinds = possible_inputs(recording) if driven_by is None else [driven_by]
-    best, failure = None, None
-    for kind in kinds:
+@dataclass(frozen=True)
+class _Trial:
+    """All recordings with one kind of input: name, stretches and modes of each, and why some show none."""
+
+    kind: str | None
+    found: list[tuple[str, list[Stretch], Fit]]
+    silent: list[RecordingError]
+
+    @property
+    def doubt(self) -> tuple[int, float]:
+        """How many show none, and how far the others are from being explained."""
+        misfits = [max(fit.misfit / MISFIT, 1.0) for _, _, fit in self.found]
+        return len(self.silent), float(np.mean(np.log(misfits))) if misfits else 0.0
+
+
+def _tried(recordings: Sequence[Recording], kind: str | None) -> _Trial:
+    found, silent = [], []
+    for recording in recordings:
         try:
-            found = stretches(recording, kind)
-            found, fit = _from_the_start(found, recording.source)
+            pieces, fit = _from_the_start(stretches(recording, kind), recording.source)
+            found.append((recording.source, pieces, fit))
         except RecordingError as error:
-            failure = failure or error
-            continue
-        if best is None or fit.misfit < best[1].misfit:
-            best = found, fit, kind
-        if fit.explained > WELL:
-            break
-    if best is None:
-        raise failure or RecordingError(f"{recording.source}: nothing rings.")
-    return best
+            silent.append(error)
+    return _Trial(kind, found, silent)
 
 
 def _from_the_start(found: list[Stretch], source: str) -> tuple[list[Stretch], Fit]:
@@ -196,8 +196,23 @@ def _worth(fit: Fit) -> np.ndarray:
     return np.arange(len(sizes)) != worst
 
 
-def _doubts(found: list[Stretch], fit: Fit, source: str, kind: str | None) -> list[str]:
-    """What to think twice about: few cycles, slow sampling, noise, the input, damping that changes with size."""
+def _meant(kind: str | None) -> list[str]:
+    """What the modes are of, where it is not the loop that a reference drives."""
+    if kind in DRIVES:
+        return [
+            f"no reference is recorded, so these are the modes of the arm moved by its drive ({kind}); a position "
+            "loop around it changes them. Record reference_1 to have those of the loop."
+        ]
+    if kind == "angle":
+        return [
+            "these are the modes of the links with the joint's angle given, those that ring if the joint is held "
+            "stiffly. Record reference_1 to have those of the loop as it is."
+        ]
+    return []
+
+
+def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
+    """What to think twice about: few cycles, slow sampling, noise, damping that changes with size."""
     said = []
     first = int(np.argmax(fit.ringing))
     f = fit.frequency[first]
@@ -223,16 +238,10 @@ def _doubts(found: list[Stretch], fit: Fit, source: str, kind: str | None) -> li
         said.append(
             f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
         )
-    if len(found[0].inputs) and kind in DRIVES:
+    if fit.misfit > MISFIT and len(found[0].inputs):
         said.append(
-            f"{source}: no reference is recorded, so these are the modes of the arm moved by its drive "
-            f"({kind}); a position loop around it changes them. Record reference_1 to have the loop's own, or "
-            "take them from the model (jaxflex shaper ARM)."
-        )
-    if len(found[0].inputs) and kind == "angle":
-        said.append(
-            f"{source}: these are the modes of the links with the joint's angle given: those that ring if the "
-            "joint is held stiffly. Record reference_1 to have those of the loop as it is."
+            f"{source}: what is left is {np.sqrt(fit.misfit):.0f} times the noise: friction or another effect "
+            "that is not linear, or a sensor that lags; frequency and damping are of the mean motion."
         )
     changes = _changes(found, fit, source, first)
     if fit.misfit > MISFIT and not len(found[0].inputs) and not changes:

@@ -1,5 +1,6 @@
 """The stretches of a recording that tell how the arm rings: free decays, or all of a driven run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,17 +43,18 @@ def live(recording: Recording, kinds: tuple[str, ...]) -> list[str]:
     return [name for name in names if not dead(recording[name])]
 
 
-def possible_inputs(recording: Recording) -> list[str | None]:
+def common_inputs(recordings: Sequence[Recording]) -> list[str | None]:
     """Which kinds of channel may count as what drives the arm, the likeliest first; None if nothing recorded does.
 
-    The reference where it is recorded, for what a shaper has to cancel are the modes that
+    The reference where all have it, for what a shaper has to cancel are the modes that
     the reference excites. Else the drive's command; and, if that explains little (of a joint
     that rubs, say), the joint's own angle, whatever moves it.
     """
-    if live(recording, ("reference",)):
+    there = [kind for kind in INPUTS if all(live(recording, (kind,)) for recording in recordings)]
+    if "reference" in there:
         return ["reference"]
-    drive = next((kind for kind in DRIVES if live(recording, (kind,))), None)
-    return [drive, "angle"] if live(recording, ("angle",)) else [drive]
+    drive = next((kind for kind in DRIVES if kind in there), None)
+    return [drive, "angle"] if "angle" in there else [drive]
 
 
 def stretches(recording: Recording, driven_by: str | None) -> list[Stretch]:
@@ -71,6 +73,10 @@ def stretches(recording: Recording, driven_by: str | None) -> list[Stretch]:
             "that is not constant is needed."
         )
     drives = [] if driven_by is None else live(recording, (driven_by,))
+    if driven_by is not None and not drives:
+        raise RecordingError(
+            f"{recording.source}: no channel {driven_by}_1 that changes; found {', '.join(recording.channels)}."
+        )
     found = []
     for piece in recording.split_at_gaps():
         if len(piece) < LEAST:
