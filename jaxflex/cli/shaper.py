@@ -13,7 +13,7 @@ from controllers import ALTERNATING, Rated, rate_shapers, recommend, residual_cu
 from ..files.read_recording import read_recording
 from ..plotting_shaper import plot_shapers
 from ..ringing import MeasuredMode, measure_modes
-from ..ringing.stretches import spectrum_of
+from ..ringing.stretches import INPUTS, spectrum_of
 from .report import bullets, card, paragraph, picture, section, tables, write_report
 from .runtime import UsageError, console, make_folder, parse_payloads
 from .shaper_model import modes_of_arm
@@ -57,6 +57,8 @@ def shaper(
         raise UsageError(f"{len(files)} arms are given: one arm.toml, or recordings, are allowed.")
     if driven_by is not None and not recordings:
         raise UsageError("--input: allowed with recordings only.")
+    if driven_by is not None and driven_by not in INPUTS:
+        raise UsageError(f"--input {driven_by}: allowed are {', '.join(INPUTS)}.")
     if recordings and payloads is not None:
         raise UsageError(
             "--payloads: allowed with an arm only; recordings show the payloads they were made with."

@@ -12,7 +12,10 @@ SAMPLES = 6000  # that candidates are judged on
 
 
 def next_pole(found: list[Stretch], candidates: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """The one of `candidates` [rad/s] that explains most of what the poles `there` leave, if that is more than noise would be."""
+    """The one of `candidates` [rad/s] that explains most of what the poles `there` leave.
+
+    None, as an empty array, if that is no more than it would explain of noise.
+    """
     gains, power, samples, free = np.zeros(len(candidates)), 0.0, 0, 0
     for stretch, whole, every in zip(found, scaled(found), sparse(found, SAMPLES), strict=True):
         y = whole[:, ::every].T

@@ -25,9 +25,10 @@ CLEAN = 1e-4  # share of the variance below which nothing is told from noise
 class Fit:
     """Modes: `frequency` [Hz] (undamped), `damping_ratio`, their `covariance` in the order f_1, zeta_1, f_2, ….
 
-    `size`: the largest part of each mode in any channel, as a share of all that is seen; `ringing`: of a
-    driven run, the mode's share of all ringing after a step of the input; else the size. `explained`: the share of the variance; `misfit`: what is left, as a multiple of the noise; `samples`
-    fitted, and parameters `added` by each mode.
+    `size`: the largest part of each mode in any channel, as a share of all that is seen;
+    `ringing`: of a driven run, the mode's share of all ringing after a step of the input;
+    else the size. `explained`: the share of the variance; `misfit`: what is left, as a
+    multiple of the noise; `samples` fitted, and parameters `added` by each mode.
     """
 
     frequency: np.ndarray
@@ -92,10 +93,14 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     def residuals(x):
         poles = all_poles(x)
         return np.concatenate(
-            [_left(columns(s, poles, n), y).ravel() for s, y, n in zip(stretches, targets, every, strict=True)]
+            [
+                _left(columns(s, poles, n), y).ravel()
+                for s, y, n in zip(stretches, targets, every, strict=True)
+            ]
         )
 
     first = np.concatenate([start, np.log(np.maximum(-real, 1e-6))])
+
     def slopes(x):
         """Of the residuals, but for what of them stays within the columns (Kaufman 1975)."""
         steps = 1e-6 * np.maximum(np.abs(x), 1e-3)
@@ -139,7 +144,9 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     explained = 1 - float(found.fun @ found.fun) / max(total, 1e-300)
     misfit = variance / max(_noise(stretches), CLEAN * total / samples, 1e-300)
     added = 2 + sum(2 * (1 + len(s.inputs)) * len(s.outputs) for s in stretches)
-    return Fit(modes[0::2], modes[1::2], covariance[:count, :count], sizes, rings, explained, misfit, samples, added)
+    return Fit(
+        modes[0::2], modes[1::2], covariance[:count, :count], sizes, rings, explained, misfit, samples, added
+    )
 
 
 def sparse(stretches: list[Stretch], most: int) -> list[int]:

@@ -15,7 +15,10 @@ MODES = 4  # of a recording, at most
 SMALL = 0.02  # share of the motion below which a mode is left out
 RINGS = 0.6  # damping ratio above which nothing rings
 SIGMAS = 2.0  # standard deviations that a spread reaches to either side
-MET, MISFIT = 1.5, 3.0  # times the noise: up to the first no more is left than noise, from the second on more is
+MET, MISFIT = (
+    1.5,
+    3.0,
+)  # times the noise: up to the first no more is left than noise, from the second on more is
 WELL = 0.9  # share of the variance from which on the modes are believed to be all there is
 LATER = (0.25, 1.0, 4.0)  # cycles after which a decay may begin in earnest
 HEARD = 0.1  # share of the variance that the modes have to explain
@@ -238,7 +241,7 @@ def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
         said.append(
             f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
         )
-    if fit.misfit > MISFIT and len(found[0].inputs):
+    if fit.misfit > MISFIT**2 and len(found[0].inputs):
         said.append(
             f"{source}: what is left is {np.sqrt(fit.misfit):.0f} times the noise: friction or another effect "
             "that is not linear, or a sensor that lags; frequency and damping are of the mean motion."
