@@ -88,11 +88,22 @@ def _from_recordings(paths: Sequence[Path], driven_by: str | None) -> Found:
     top = 1.3 * max([3 * measured.modes[0].frequency, *(mode.frequency for mode in measured.modes)])
     frequencies = np.linspace(0.0, top, DRAWN)
     spectrum = np.zeros(DRAWN)
+    if any(len(stretch.inputs) for stretch in measured.stretches):
+        # peaks of a driven motion may be those of its input: what a step would ring with instead
+        for mode in measured.modes:
+            pole = (
+                2 * np.pi * mode.frequency * (-mode.damping_ratio + 1j * np.sqrt(1 - mode.damping_ratio**2))
+            )
+            spectrum = np.hypot(spectrum, mode.size / np.abs(2j * np.pi * frequencies - pole))
+        return Found(_names(paths), measured.modes, frequencies, spectrum, measured.warnings, measured.used)
     for stretch in measured.stretches:
         f, density = spectrum_of(stretch.outputs, stretch.step)
         spectrum = np.maximum(spectrum, np.interp(frequencies, f, np.sqrt(density), right=0.0))
-    names = ", ".join(path.name for path in paths)
-    return Found(names, measured.modes, frequencies, spectrum, measured.warnings, measured.used)
+    return Found(_names(paths), measured.modes, frequencies, spectrum, measured.warnings, measured.used)
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in paths)
 
 
 def mode_table(found: Found) -> Table:

@@ -130,7 +130,12 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
         [np.column_stack([start[0::2], np.full(count // 2, 0.05)]).ravel(), np.ones(len(real))]
     )
     found = least_squares(
-        residuals, np.clip(first, low + 1e-9, high - 1e-9), slopes, (low, high), x_scale=scale, max_nfev=60
+        residuals,
+        np.clip(first, low + 1e-9, high - 1e-9),
+        slopes,  # pyright: ignore
+        (low, high),
+        x_scale=scale,
+        max_nfev=60,
     )
     samples = len(found.fun)
     width = [2 + len(s.inputs) + (count + len(real)) * (1 + len(s.inputs)) for s in stretches]

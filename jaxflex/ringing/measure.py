@@ -7,19 +7,17 @@ import numpy as np
 
 from ..files.recording import Recording, RecordingError
 from .choose import least_gain, next_pole
+from .doubts import MISFIT, WELL, doubts, meant
 from .fit import Fit, fit_modes, poles_of
 from .poles import first_poles
-from .stretches import DRIVES, INPUTS, Stretch, common_inputs, later, stretches
+from .stretches import INPUTS, Stretch, common_inputs, later, stretches
 
 MODES = 4  # of a recording, at most
 SMALL = 0.02  # share of the motion below which a mode is left out
+FAST = 0.45  # frequency, times the sample time, up to which a mode is told from the sampling
 RINGS = 0.6  # damping ratio above which nothing rings
 SIGMAS = 2.0  # standard deviations that a spread reaches to either side
-MET, MISFIT = (
-    1.5,
-    3.0,
-)  # times the noise: up to the first no more is left than noise, from the second on more is
-WELL = 0.9  # share of the variance from which on the modes are believed to be all there is
+MET = 1.5  # times the noise, up to which no more is left than noise
 LATER = (0.25, 1.0, 4.0)  # cycles after which a decay may begin in earnest
 HEARD = 0.1  # share of the variance that the modes have to explain
 SAME = 0.25  # relative difference in frequency within which modes of two recordings are the same
@@ -76,10 +74,10 @@ def measure_modes(recordings: Sequence[Recording], driven_by: str | None = None)
         raise best.silent[0]
     warnings = [f"{recording.source}: {repair}" for recording in recordings for repair in recording.repairs]
     if any(len(part.inputs) for _, found, _ in best.found for part in found):
-        warnings += _meant(best.kind)
+        warnings += meant(best.kind)
     used, parts = [], []
     for source, found, fit in best.found:
-        warnings += _doubts(found, fit, source)
+        warnings += doubts(found, fit, source)
         used.append(_said(found, source))
         parts += found
     warnings += [f"left out: {error}" for error in best.silent]
@@ -137,7 +135,9 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
     nyquist = np.pi / found[0].step
     longest = max(s.times[-1] for s in found)
     damping = -np.real(poles) / np.maximum(np.abs(poles), 1e-300)
-    rings = (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < 0.95 * nyquist)
+    rings = (
+        (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < FAST * 2 * nyquist)
+    )
     rings &= np.abs(poles) * longest > 2 * np.pi  # a full turn within the data
     alone = (np.abs(np.imag(poles)) < 1e-9) & (np.real(poles) < -0.5 / longest)
     real = np.real(poles)[alone & (np.real(poles) > -nyquist / 3)]
@@ -149,7 +149,7 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
             "longer decay, or excite the arm more."
         )
     for _ in range(2 * MODES):
-        keep = _worth(fit)
+        keep = _worth(fit, FAST / found[0].step)
         if keep.all():
             break
         if not keep.any():
@@ -180,9 +180,9 @@ def _grown(found: list[Stretch], candidates: np.ndarray, slow: np.ndarray) -> Fi
     return fit
 
 
-def _worth(fit: Fit) -> np.ndarray:
-    """Which modes to keep: large enough, known well enough, ringing, and the `MODES` largest."""
-    sizes = np.where(fit.damping_ratio < RINGS, fit.size, 0.0)
+def _worth(fit: Fit, highest: float) -> np.ndarray:
+    """Which modes to keep: below `highest` [Hz], large enough, known well, ringing, and the `MODES` largest."""
+    sizes = np.where((fit.damping_ratio < RINGS) & (fit.frequency < highest), fit.size, 0.0)
     sizes = np.where(fit.frequency_std < 0.1 * fit.frequency, sizes, 0.0)
     unsure = fit.damping_std > 0.5 * np.maximum(fit.damping_ratio, 0.0)
     sizes = np.where(unsure & (sizes < sizes.max()), 0.0, sizes)
@@ -197,98 +197,6 @@ def _worth(fit: Fit) -> np.ndarray:
     # one at a time: others may change once it is gone
     worst = np.argmin(np.where(keep, np.inf, sizes))
     return np.arange(len(sizes)) != worst
-
-
-def _meant(kind: str | None) -> list[str]:
-    """What the modes are of, where it is not the loop that a reference drives."""
-    if kind in DRIVES:
-        return [
-            f"no reference is recorded, so these are the modes of the arm moved by its drive ({kind}); a position "
-            "loop around it changes them. Record reference_1 to have those of the loop."
-        ]
-    if kind == "angle":
-        return [
-            "these are the modes of the links with the joint's angle given, those that ring if the joint is held "
-            "stiffly. Record reference_1 to have those of the loop as it is."
-        ]
-    return []
-
-
-def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
-    """What to think twice about: few cycles, slow sampling, noise, damping that changes with size."""
-    said = []
-    first = int(np.argmax(fit.ringing))
-    f = fit.frequency[first]
-    cycles = f * max(s.times[-1] for s in found)
-    if cycles < 5:
-        said.append(
-            f"{source}: only {cycles:.1f} cycles at {f:.3g} Hz; record at least five for its damping."
-        )
-    per_cycle = 1 / (f * found[0].step)
-    if per_cycle < 8:
-        said.append(f"{source}: only {per_cycle:.1f} samples a cycle at {f:.3g} Hz; sample faster.")
-    if fit.explained < WELL:
-        said.append(
-            f"{source}: {100 * fit.explained:.0f} % of the motion is that of its modes; the rest is noise, "
-            "friction or another disturbance."
-        )
-    if fit.damping_std[first] > 0.3 * max(fit.damping_ratio[first], 1e-3):
-        said.append(
-            f"{source}: the damping ratio {fit.damping_ratio[first]:.3g} is known to "
-            f"+-{fit.damping_std[first]:.2g} only; record a longer or stronger vibration."
-        )
-    if fit.damping_ratio[first] < 0:
-        said.append(
-            f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
-        )
-    if fit.misfit > MISFIT**2 and len(found[0].inputs):
-        said.append(
-            f"{source}: what is left is {np.sqrt(fit.misfit):.0f} times the noise: friction or another effect "
-            "that is not linear, or a sensor that lags; frequency and damping are of the mean motion."
-        )
-    changes = _changes(found, fit, source, first)
-    if fit.misfit > MISFIT and not len(found[0].inputs) and not changes:
-        said.append(
-            f"{source}: what rings does not die out as a free vibration does (what is left is "
-            f"{np.sqrt(fit.misfit):.0f} times the noise): it rubs, or something that is not recorded drives it. "
-            "Record reference_1 with it, or a decay after all has stopped."
-        )
-    return said + changes
-
-
-def _changes(found: list[Stretch], fit: Fit, source: str, first: int) -> list[str]:
-    """A word where frequency or damping of the largest mode differs between early and late in the decays."""
-    f, zeta = fit.frequency[first], max(fit.damping_ratio[first], 1e-3)
-    if len(found[0].inputs):
-        return []
-    early, late = [], []
-    for stretch in found:
-        # each half is as long as the vibration takes to fall to a third, but three cycles at least
-        half = int(max(1.1 / (2 * np.pi * f * zeta), 3 / f) / stretch.step)
-        half = min(half, stretch.outputs.shape[1] // 2)
-        if half * stretch.step * f < 2:
-            return []
-        for parts, start in ((early, 0), (late, half)):
-            window = stretch.outputs[:, start : start + half]
-            parts.append(Stretch(stretch.step, window, stretch.inputs[:, :half], stretch.channels, source))
-    start = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)]).ravel()
-    before, after = (fit_modes(parts, start, np.zeros(0)) for parts in (early, late))
-    said = []
-    for name, a, b, da, db, share in (
-        ("damping ratio", before.damping_ratio[first], after.damping_ratio[first],
-         before.damping_std[first], after.damping_std[first], 0.2),
-        ("frequency", before.frequency[first], after.frequency[first],
-         before.frequency_std[first], after.frequency_std[first], 0.01),
-    ):  # fmt: skip
-        if abs(b - a) > 4 * np.hypot(da, db) and abs(b - a) > share * max(abs(a), abs(b)):
-            cause = (
-                "friction" if name == "damping ratio" and b > a else "a stiffness or drag that is not linear"
-            )
-            said.append(
-                f"{source}: the {name} at {f:.3g} Hz changes with amplitude, from {a:.3g} early to {b:.3g} late "
-                f"in the decay: {cause}. Both count in the spread only if recorded at both sizes."
-            )
-    return said
 
 
 def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
