@@ -140,7 +140,7 @@ def shaper_table(found: Found, rated: Sequence[Rated], best: Rated) -> Table:
 def calls_table(rated: Sequence[Rated], best: Rated) -> Table:
     """The line of Python that makes each shaper."""
     rows: list[Sequence[str]] = [(each.name, each.call) for each in rated]
-    return Table("In Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2)
+    return Table("Settings: in Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2)
 
 
 def _with_std(value: float, std: float) -> str:
@@ -154,7 +154,7 @@ def _show(found: Found, rated: Sequence[Rated], best: Rated, why: str) -> None:
     console.print(f"[bold]{found.title}[/]")
     for line in found.used:
         console.print(f"  {line}", markup=False, style="dim")
-    for table in (mode_table(found), shaper_table(found, rated, best)):
+    for table in (mode_table(found), shaper_table(found, rated, best), calls_table(rated, best)):
         console.print()
         console.print(table.rich())
     console.print()
