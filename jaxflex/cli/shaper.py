@@ -140,7 +140,9 @@ def shaper_table(found: Found, rated: Sequence[Rated], best: Rated) -> Table:
 def calls_table(rated: Sequence[Rated], best: Rated) -> Table:
     """The line of Python that makes each shaper."""
     rows: list[Sequence[str]] = [(each.name, each.call) for each in rated]
-    return Table("Settings: in Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2)
+    return Table(
+        "Settings: in Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2
+    )
 
 
 def _with_std(value: float, std: float) -> str:
