@@ -14,6 +14,7 @@ from .shapers import SHAPERS, Shaper, convolve, residual_ratio, si, simultaneous
 
 SECOND = 0.1  # size of a second mode, relative to the first, from which shapers for both are looked at
 ALTERNATING = ("UM-ZV", "UM-ZVD")  # ask the drive for twice the acceleration: listed, not recommended
+ALTERNATING_UP_TO = 0.7  # damping ratio
 GRID = (81, 5)  # frequencies and damping ratios of the spread that are looked at
 NEAR = 0.01  # relative difference in time or residual that does not count
 
@@ -71,6 +72,7 @@ def rate_shapers(modes: Sequence[MeasuredMode], tolerance: float = 0.05) -> list
     made: dict[str, tuple[Callable[[], Shaper], str]] = {
         name: (lambda make=make: make(jnp.asarray(f), jnp.asarray(z)), CALLS[name].format(**written))
         for name, make in SHAPERS.items()
+        if name not in ALTERNATING or z <= ALTERNATING_UP_TO
     }
     width = 2 * max(abs(edge / f - 1) for edge in first.frequency_range)
     width = min(max(round(width + 0.005, 2), 0.1), 0.9)

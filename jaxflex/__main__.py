@@ -89,16 +89,23 @@ def shaper(
         Optional[list[Path]],
         typer.Argument(
             metavar="[ARM | RUN...]",
-            help="arm.toml, or recordings of its vibration (CSV); without either, the built-in two-link arm.",
+            help="arm.toml, or recordings of its vibration; without either, the built-in two-link arm.",
         ),
     ] = None,
     payloads: Annotated[Optional[str], typer.Option(help="kg, FIRST:LAST:COUNT or A,B,…; of an arm.")] = None,
+    driven_by: Annotated[
+        Optional[str],
+        typer.Option(
+            "--input",
+            help="What drives the arm in the recordings: reference, voltage, torque, current or angle.",
+        ),
+    ] = None,
     tolerance: Annotated[float, typer.Option(help="Share of the vibration that may be left.")] = 0.05,
     json: Json = None,
     output: Output = None,
 ) -> None:
     """Measure or compute what rings, and recommend an input shaper, with the reason."""
-    command(shaper_command)(files or [], payloads, tolerance, json, output)
+    command(shaper_command)(files or [], payloads, driven_by, tolerance, json, output)
 
 
 def main() -> None:

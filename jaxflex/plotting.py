@@ -191,7 +191,10 @@ def plot_history(histories: Sequence[Sequence[float]]) -> Figure:
 
 
 def plot_pareto(
-    move_times: np.ndarray, residual: np.ndarray, efficient: np.ndarray, others: Mapping[str, np.ndarray]
+    move_times: np.ndarray,
+    residual: np.ndarray,
+    efficient: np.ndarray,
+    others: Mapping[str, np.ndarray] | None = None,
 ) -> Figure:
     """Worst residual vibration [m] against move time [s]: the front, and `others` at the same move times.
 
@@ -199,7 +202,7 @@ def plot_pareto(
     """
     figure, axes = panels(1, 1, height=4.2, width=8.0)
     axis = axes[0, 0]
-    for i, (name, values) in enumerate(others.items()):
+    for i, (name, values) in enumerate((others or {}).items()):
         axis.semilogy(
             move_times, 1e3 * values, "--", color=f"C{i + 1}", linewidth=1.1, marker=".", label=name
         )

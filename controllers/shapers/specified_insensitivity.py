@@ -40,7 +40,8 @@ def si(
     `frequency` [Hz]. The number of impulses follows from `insensitivity` and
     `tolerance`, so these are plain numbers. The shortest such shaper of positive impulses
     where the mode is not damped. With damping each impulse is weighted with the decay of
-    the mode, and less than the tolerance is left up to a damping ratio of 0.1.
+    the mode; it then is on the safe side, and no longer the shortest: of 5 % allowed it
+    leaves 4 % at a damping ratio of 0.1 and 2 to 3 % at 0.3.
 
     **Raises** `ValueError` for an insensitivity not within 0 and 0.9, or a tolerance not
     within 0.01 and 0.5.

@@ -16,7 +16,19 @@ GROUPS = {
     "extra-insensitive": ("EI", "EI, 2 humps", "EI, 3 humps"),
     "unity magnitude": ("UM-ZV", "UM-ZVD"),
     "smooth": ("moving average", "parabola", "half sine", "cosine"),
+    "specified insensitivity": ("SI, 0.2", "SI, 0.45", "SI, 0.7"),
+    "two modes": ("ZV x ZV", "ZVD x ZVD", "both together"),
 }
+SECOND = 2.2  # frequency of the second mode, of the first
+SPECIFIED = {
+    f"SI, {width:g}": lambda f, zeta=0.0, width=width: ctl.si(f, zeta, width) for width in (0.2, 0.45, 0.7)
+}
+TWO_MODES = {
+    "ZV x ZV": lambda f, zeta=0.0: ctl.convolve(ctl.zv(f, zeta), ctl.zv(SECOND * f, zeta)),
+    "ZVD x ZVD": lambda f, zeta=0.0: ctl.convolve(ctl.zvd(f, zeta), ctl.zvd(SECOND * f, zeta)),
+    "both together": lambda f, zeta=0.0: ctl.simultaneous(jnp.array([f, SECOND * f]), jnp.full(2, zeta)),
+}
+ALL = ctl.SHAPERS | SPECIFIED | TWO_MODES
 WIDTHS = np.linspace(0.0, 0.9, 46)  # of SI
 
 
@@ -34,7 +46,7 @@ def run(folder: Path, reduced: bool) -> dict:
             "insensitivity_damped": float(ctl.insensitivity(make(1.0, DAMPING), 1.0, DAMPING)),
             "published": PUBLISHED.get(name),
         }
-        for name, make in ctl.SHAPERS.items()
+        for name, make in (ctl.SHAPERS | SPECIFIED).items()
     }
     draw_costs(table, widths, times).savefig(folder / "costs.png", dpi=130)
     return {"tolerance": 0.05, "damping_ratio": DAMPING, "shapers": table}
@@ -42,19 +54,19 @@ def run(folder: Path, reduced: bool) -> dict:
 
 def draw_curves(count: int):
     """Residual against frequency, without damping and with, a panel for each family."""
-    ratios = jnp.linspace(0.3, 1.9, count)
-    made, axes = figure(2, 2, height=3.0, width=11.0)
+    made, axes = figure(3, 2, height=3.0, width=11.0)
     for axis, (title, names) in zip(axes.flat, GROUPS.items(), strict=True):
+        places = jnp.linspace(0.3, 1.9 if title != "two modes" else 3.0, count)
         for i, name in enumerate(names):
             for zeta, style in ((0.0, "-"), (DAMPING, ":")):
-                curve = ctl.residual_curve(ctl.SHAPERS[name](1.0, zeta), ratios, zeta)
+                curve = ctl.residual_curve(ALL[name](1.0, zeta), places, zeta)
                 label = name if zeta == 0 else None
-                axis.plot(ratios, 100 * curve, style, color=f"C{i}", linewidth=1.3, label=label)
+                axis.plot(places, 100 * curve, style, color=f"C{i}", linewidth=1.3, label=label)
         axis.axhline(5.0, color="0.4", linewidth=0.8, linestyle="--")
         axis.set_ylim(0, 60)
         axis.set_title(title, fontsize=10)
         axis.legend(fontsize=8, frameon=False, loc="upper center")
-    for axis in axes[1]:
+    for axis in axes[-1]:
         axis.set_xlabel("frequency of the mode, share of that designed for [1]")
     for axis in axes[:, 0]:
         axis.set_ylabel("vibration left [%]")
@@ -70,7 +82,7 @@ def draw_costs(table: dict, widths: np.ndarray, times: dict):
     for (share, durations), colour in zip(times.items(), ("0.3", "0.65"), strict=True):
         axis.plot(widths, durations, color=colour, label=f"SI, {100 * share:g} % left")
     for i, (name, row) in enumerate(table.items()):
-        if row["insensitivity"] <= 1.05:
+        if row["insensitivity"] <= 1.05 and name not in SPECIFIED:
             axis.plot(row["insensitivity"], row["duration_periods"], "o", color=f"C{i % 10}")
             axis.annotate(
                 name, (row["insensitivity"], row["duration_periods"]), xytext=(6, -3),

@@ -13,7 +13,7 @@ from controllers import ALTERNATING, Rated, rate_shapers, recommend, residual_cu
 from ..files.read_recording import read_recording
 from ..plotting_shaper import plot_shapers
 from ..ringing import MeasuredMode, measure_modes
-from ..ringing.stretches import spectrum_of
+from ..ringing.stretches import INPUTS, spectrum_of
 from .report import bullets, card, paragraph, picture, section, tables, write_report
 from .runtime import UsageError, console, make_folder, parse_payloads
 from .shaper_model import modes_of_arm
@@ -40,22 +40,31 @@ class Found(NamedTuple):
 
 
 def shaper(
-    files: Sequence[Path], payloads: str | None, tolerance: float, json: Path | None, output: Path | None
+    files: Sequence[Path],
+    payloads: str | None,
+    driven_by: str | None,
+    tolerance: float,
+    json: Path | None,
+    output: Path | None,
 ) -> None:
     """Find the modes, rate the shapers, print, draw and write."""
     if not 0 < tolerance < 1:
         raise UsageError(f"--tolerance {tolerance:g}: allowed is more than 0 and less than 1.")
-    recordings = [file for file in files if file.suffix.lower() == ".csv"]
+    recordings = [file for file in files if file.suffix.lower() != ".toml"]
     if recordings and len(recordings) < len(files):
-        raise UsageError("an arm and recordings are given: one arm.toml, or recordings (.csv), are allowed.")
+        raise UsageError("an arm and recordings are given: one arm.toml, or recordings, are allowed.")
     if len(files) > 1 and not recordings:
-        raise UsageError(f"{len(files)} arms are given: one arm.toml, or recordings (.csv), are allowed.")
+        raise UsageError(f"{len(files)} arms are given: one arm.toml, or recordings, are allowed.")
+    if driven_by is not None and not recordings:
+        raise UsageError("--input: allowed with recordings only.")
+    if driven_by is not None and driven_by not in INPUTS:
+        raise UsageError(f"--input {driven_by}: allowed are {', '.join(INPUTS)}.")
     if recordings and payloads is not None:
         raise UsageError(
             "--payloads: allowed with an arm only; recordings show the payloads they were made with."
         )
     if recordings:
-        found = _from_recordings(recordings)
+        found = _from_recordings(recordings, driven_by)
     else:
         masses = None if payloads is None else parse_payloads(payloads)
         found = Found(*modes_of_arm(files[0] if files else None, masses, DRAWN))
@@ -74,16 +83,27 @@ def shaper(
     console.print(f"wrote report.html, shaper.toml, shaper.json and shaper.png to {folder}/", markup=False)
 
 
-def _from_recordings(paths: Sequence[Path]) -> Found:
-    measured = measure_modes([read_recording(path) for path in paths])
+def _from_recordings(paths: Sequence[Path], driven_by: str | None) -> Found:
+    measured = measure_modes([read_recording(path) for path in paths], driven_by)
     top = 1.3 * max([3 * measured.modes[0].frequency, *(mode.frequency for mode in measured.modes)])
     frequencies = np.linspace(0.0, top, DRAWN)
     spectrum = np.zeros(DRAWN)
+    if any(len(stretch.inputs) for stretch in measured.stretches):
+        # peaks of a driven motion may be those of its input: what a step would ring with instead
+        for mode in measured.modes:
+            pole = (
+                2 * np.pi * mode.frequency * (-mode.damping_ratio + 1j * np.sqrt(1 - mode.damping_ratio**2))
+            )
+            spectrum = np.hypot(spectrum, mode.size / np.abs(2j * np.pi * frequencies - pole))
+        return Found(_names(paths), measured.modes, frequencies, spectrum, measured.warnings, measured.used)
     for stretch in measured.stretches:
         f, density = spectrum_of(stretch.outputs, stretch.step)
         spectrum = np.maximum(spectrum, np.interp(frequencies, f, np.sqrt(density), right=0.0))
-    names = ", ".join(path.name for path in paths)
-    return Found(names, measured.modes, frequencies, spectrum, measured.warnings, measured.used)
+    return Found(_names(paths), measured.modes, frequencies, spectrum, measured.warnings, measured.used)
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return ", ".join(path.name for path in paths)
 
 
 def mode_table(found: Found) -> Table:
@@ -120,7 +140,9 @@ def shaper_table(found: Found, rated: Sequence[Rated], best: Rated) -> Table:
 def calls_table(rated: Sequence[Rated], best: Rated) -> Table:
     """The line of Python that makes each shaper."""
     rows: list[Sequence[str]] = [(each.name, each.call) for each in rated]
-    return Table("In Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2)
+    return Table(
+        "Settings: in Python, after import controllers as ctl", ["shaper", "call"], rows, best.name, 2
+    )
 
 
 def _with_std(value: float, std: float) -> str:
@@ -134,7 +156,7 @@ def _show(found: Found, rated: Sequence[Rated], best: Rated, why: str) -> None:
     console.print(f"[bold]{found.title}[/]")
     for line in found.used:
         console.print(f"  {line}", markup=False, style="dim")
-    for table in (mode_table(found), shaper_table(found, rated, best)):
+    for table in (mode_table(found), shaper_table(found, rated, best), calls_table(rated, best)):
         console.print()
         console.print(table.rich())
     console.print()

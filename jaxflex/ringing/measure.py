@@ -6,14 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..files.recording import Recording, RecordingError
-from .fit import Fit, fit_modes, poles_of, sizes_of
+from .choose import least_gain, next_pole
+from .doubts import MISFIT, WELL, doubts, meant
+from .fit import Fit, fit_modes, poles_of
 from .poles import first_poles
-from .stretches import Stretch, stretches
+from .stretches import INPUTS, Stretch, common_inputs, later, stretches
 
 MODES = 4  # of a recording, at most
 SMALL = 0.02  # share of the motion below which a mode is left out
+FAST = 0.45  # frequency, times the sample time, up to which a mode is told from the sampling
 RINGS = 0.6  # damping ratio above which nothing rings
 SIGMAS = 2.0  # standard deviations that a spread reaches to either side
+MET = 1.5  # times the noise, up to which no more is left than noise
+LATER = (0.25, 1.0, 4.0)  # cycles after which a decay may begin in earnest
 HEARD = 0.1  # share of the variance that the modes have to explain
 SAME = 0.25  # relative difference in frequency within which modes of two recordings are the same
 
@@ -24,7 +29,8 @@ class MeasuredMode:
 
     `frequency` [Hz] is the undamped one; `frequency_range`, `damping_range` hold every
     recording's estimate with two standard deviations to either side; `size` is the
-    largest excursion of the mode as a share of all motion of its channel.
+    largest excursion of the mode as a share of all motion of its channel; of a run that is driven
+    throughout, the mode's share of all ringing after a step of the input.
     """
 
     frequency: float
@@ -47,26 +53,80 @@ class MeasuredModes:
     stretches: tuple[Stretch, ...]
 
 
-def measure_modes(recordings: Sequence[Recording]) -> MeasuredModes:
+def measure_modes(recordings: Sequence[Recording], driven_by: str | None = None) -> MeasuredModes:
     """Frequencies and damping ratios of all modes that ring in `recordings`.
 
     Strain, tip deflection and tip acceleration are looked at; all such channels of a
-    recording share their modes. Free decays are fitted as such, runs that are driven
-    throughout together with their input; see `stretches`.
+    recording share their modes. Where the input stands still the free decay is fitted,
+    else output and input together. `driven_by` says which kind of channel is the input
+    (`reference`, `voltage`, `torque`, `current`, `angle`), and so what the modes are of:
+    the closed loop, the arm moved by its drive, the links with the joint's motion given.
+    Without it the reference is, where it is recorded; else the drive; and the angle where
+    the drive explains little. A recording that shows none is left out, with a word.
 
-    **Raises** `RecordingError` where a recording shows no vibration.
+    **Raises** `RecordingError` where no recording shows vibration, or one has no such input.
     """
-    fits, parts, warnings, used = [], [], [], []
-    for recording in recordings:
-        warnings += [f"{recording.source}: {repair}" for repair in recording.repairs]
-        found = stretches(recording)
-        fit = _modes_of(found, recording.source)
-        fits.append(fit)
+    if driven_by is not None and driven_by not in INPUTS:
+        raise RecordingError(f"driven_by = {driven_by!r} is unknown; allowed are {', '.join(INPUTS)}.")
+    kinds = [driven_by] if driven_by else common_inputs(recordings)
+    best = min((_tried(recordings, kind) for kind in kinds), key=lambda trial: trial.doubt)
+    if not best.found:
+        raise best.silent[0]
+    warnings = [f"{recording.source}: {repair}" for recording in recordings for repair in recording.repairs]
+    if any(len(part.inputs) for _, found, _ in best.found for part in found):
+        warnings += meant(best.kind)
+    used, parts = [], []
+    for source, found, fit in best.found:
+        warnings += doubts(found, fit, source)
+        used.append(_said(found, source))
         parts += found
-        warnings += _doubts(found, fit, recording.source)
-        used.append(_said(found, recording.source))
-    modes, apart = _gathered(fits)
+    warnings += [f"left out: {error}" for error in best.silent]
+    modes, apart = _gathered([fit for _, _, fit in best.found])
     return MeasuredModes(tuple(modes), tuple(warnings + apart), tuple(used), tuple(parts))
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """All recordings with one kind of input: name, stretches and modes of each, and why some show none."""
+
+    kind: str | None
+    found: list[tuple[str, list[Stretch], Fit]]
+    silent: list[RecordingError]
+
+    @property
+    def doubt(self) -> tuple[int, float]:
+        """How many show none, and how far the others are from being explained."""
+        misfits = [max(fit.misfit / MISFIT, 1.0) for _, _, fit in self.found]
+        return len(self.silent), float(np.mean(np.log(misfits))) if misfits else 0.0
+
+
+def _tried(recordings: Sequence[Recording], kind: str | None) -> _Trial:
+    found, silent = [], []
+    for recording in recordings:
+        try:
+            pieces, fit = _from_the_start(stretches(recording, kind), recording.source)
+            found.append((recording.source, pieces, fit))
+        except RecordingError as error:
+            silent.append(error)
+    return _Trial(kind, found, silent)
+
+
+def _from_the_start(found: list[Stretch], source: str) -> tuple[list[Stretch], Fit]:
+    """The modes; of free decays, if something else is seen to go on at first, from some cycles later on."""
+    fit = _modes_of(found, source)
+    if fit.misfit < MET or fit.explained < 0.5 or len(found[0].inputs):
+        return found, fit
+    for cycles in LATER:
+        rest = later(found, cycles)
+        if not rest:
+            break
+        try:
+            after = _modes_of(rest, source)
+        except RecordingError:
+            break
+        if after.misfit < MET and after.explained > WELL:
+            return rest, after
+    return found, fit
 
 
 def _modes_of(found: list[Stretch], source: str) -> Fit:
@@ -75,28 +135,26 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
     nyquist = np.pi / found[0].step
     longest = max(s.times[-1] for s in found)
     damping = -np.real(poles) / np.maximum(np.abs(poles), 1e-300)
-    rings = (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < 0.95 * nyquist)
+    rings = (
+        (np.imag(poles) > 0) & (damping < RINGS) & (damping > -0.05) & (np.abs(poles) < FAST * 2 * nyquist)
+    )
     rings &= np.abs(poles) * longest > 2 * np.pi  # a full turn within the data
     alone = (np.abs(np.imag(poles)) < 1e-9) & (np.real(poles) < -0.5 / longest)
     real = np.real(poles)[alone & (np.real(poles) > -nyquist / 3)]
     slow = real[np.argsort(-real)][:2] if len(found[0].inputs) else real[:0]
-    candidates = poles[rings]
-    if not len(candidates):
+    fit = _grown(found, poles[rings], slow)
+    if fit is None:
         raise RecordingError(
             f"{source}: nothing rings: no mode with a damping ratio below {RINGS:g} was found; record a "
             "longer decay, or excite the arm more."
         )
-    start = np.column_stack([np.abs(candidates) / (2 * np.pi), np.clip(damping[rings], 1e-4, 0.9)])
-    likely = np.argsort(-sizes_of(found, poles_of(start.ravel()), slow))[: MODES + 2]
-    fit = fit_modes(found, start[likely].ravel(), slow)
     for _ in range(2 * MODES):
-        keep = _worth(fit)
+        keep = _worth(fit, FAST / found[0].step)
         if keep.all():
             break
         if not keep.any():
             raise RecordingError(f"{source}: nothing rings above the noise; excite the arm more.")
-        kept = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)])[keep]
-        fit = fit_modes(found, kept.ravel(), slow)
+        fit = fit_modes(found, fit.modes.reshape(-1, 2)[keep].ravel(), slow)
     if fit.explained < HEARD:
         raise RecordingError(
             f"{source}: nothing rings above the noise: modes explain {100 * fit.explained:.0f} % of the "
@@ -105,9 +163,26 @@ def _modes_of(found: list[Stretch], source: str) -> Fit:
     return fit
 
 
-def _worth(fit: Fit) -> np.ndarray:
-    """Which modes to keep: large enough, known well enough, ringing, and the `MODES` largest."""
-    sizes = np.where(fit.damping_ratio < RINGS, fit.size, 0.0)
+def _grown(found: list[Stretch], candidates: np.ndarray, slow: np.ndarray) -> Fit | None:
+    """A mode more at a time, each fitted together with those before, as long as they explain more than noise."""
+    fit = None
+    while fit is None or len(fit.frequency) < MODES + 2:
+        there = slow if fit is None else np.concatenate([slow, poles_of(fit.modes)])
+        pole = next_pole(found, candidates, there)
+        if not len(pole):
+            break
+        more = np.array([np.abs(pole[0]) / (2 * np.pi), -np.real(pole[0]) / np.abs(pole[0])])
+        more = np.concatenate([[] if fit is None else fit.modes, more])
+        grown = fit_modes(found, more, slow)
+        if fit is not None and 1 - grown.misfit / fit.misfit < least_gain(grown.added, grown.samples):
+            break
+        fit = grown
+    return fit
+
+
+def _worth(fit: Fit, highest: float) -> np.ndarray:
+    """Which modes to keep: below `highest` [Hz], large enough, known well, ringing, and the `MODES` largest."""
+    sizes = np.where((fit.damping_ratio < RINGS) & (fit.frequency < highest), fit.size, 0.0)
     sizes = np.where(fit.frequency_std < 0.1 * fit.frequency, sizes, 0.0)
     unsure = fit.damping_std > 0.5 * np.maximum(fit.damping_ratio, 0.0)
     sizes = np.where(unsure & (sizes < sizes.max()), 0.0, sizes)
@@ -124,76 +199,11 @@ def _worth(fit: Fit) -> np.ndarray:
     return np.arange(len(sizes)) != worst
 
 
-def _doubts(found: list[Stretch], fit: Fit, source: str) -> list[str]:
-    """What to think twice about: few cycles, slow sampling, noise, and damping that changes with size."""
-    said = []
-    first = int(np.argmax(fit.size))
-    f = fit.frequency[first]
-    cycles = f * max(s.times[-1] for s in found)
-    if cycles < 5:
-        said.append(
-            f"{source}: only {cycles:.1f} cycles at {f:.3g} Hz; record at least five for its damping."
-        )
-    per_cycle = 1 / (f * found[0].step)
-    if per_cycle < 8:
-        said.append(f"{source}: only {per_cycle:.1f} samples a cycle at {f:.3g} Hz; sample faster.")
-    if fit.explained < 0.9:
-        said.append(
-            f"{source}: {100 * fit.explained:.0f} % of the motion is that of its modes; the rest is noise, "
-            "friction or another disturbance."
-        )
-    if fit.damping_std[first] > 0.3 * max(fit.damping_ratio[first], 1e-3):
-        said.append(
-            f"{source}: the damping ratio {fit.damping_ratio[first]:.3g} is known to "
-            f"+-{fit.damping_std[first]:.2g} only; record a longer or stronger vibration."
-        )
-    if fit.damping_ratio[first] < 0:
-        said.append(
-            f"{source}: the vibration at {f:.3g} Hz grows; the loop is unstable or driven by something."
-        )
-    return said + _changes(found, fit, source, first)
-
-
-def _changes(found: list[Stretch], fit: Fit, source: str, first: int) -> list[str]:
-    """A word where frequency or damping of the largest mode differs between early and late in the decays."""
-    f, zeta = fit.frequency[first], max(fit.damping_ratio[first], 1e-3)
-    if len(found[0].inputs):
-        return []
-    early, late = [], []
-    for stretch in found:
-        # each half is as long as the vibration takes to fall to a third, but three cycles at least
-        half = int(max(1.1 / (2 * np.pi * f * zeta), 3 / f) / stretch.step)
-        half = min(half, stretch.outputs.shape[1] // 2)
-        if half * stretch.step * f < 2:
-            return []
-        for parts, start in ((early, 0), (late, half)):
-            window = stretch.outputs[:, start : start + half]
-            parts.append(Stretch(stretch.step, window, stretch.inputs[:, :half], stretch.channels, source))
-    start = np.column_stack([fit.frequency, np.clip(fit.damping_ratio, 1e-4, 0.9)]).ravel()
-    before, after = (fit_modes(parts, start, np.zeros(0)) for parts in (early, late))
-    said = []
-    for name, a, b, da, db, share in (
-        ("damping ratio", before.damping_ratio[first], after.damping_ratio[first],
-         before.damping_std[first], after.damping_std[first], 0.2),
-        ("frequency", before.frequency[first], after.frequency[first],
-         before.frequency_std[first], after.frequency_std[first], 0.01),
-    ):  # fmt: skip
-        if abs(b - a) > 4 * np.hypot(da, db) and abs(b - a) > share * max(abs(a), abs(b)):
-            cause = (
-                "friction" if name == "damping ratio" and b > a else "a stiffness or drag that is not linear"
-            )
-            said.append(
-                f"{source}: the {name} at {f:.3g} Hz changes with amplitude, from {a:.3g} early to {b:.3g} late "
-                f"in the decay: {cause}. Both count in the spread only if recorded at both sizes."
-            )
-    return said
-
-
 def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
     """The modes of all recordings, those of like frequency as one, by falling size."""
     groups: list[list[tuple[Fit, int]]] = []
     order = sorted(
-        ((fit, k) for fit in fits for k in range(len(fit.frequency))), key=lambda p: -p[0].size[p[1]]
+        ((fit, k) for fit in fits for k in range(len(fit.frequency))), key=lambda p: -p[0].ringing[p[1]]
     )
     for fit, k in order:
         for group in groups:
@@ -217,7 +227,7 @@ def _gathered(fits: list[Fit]) -> tuple[list[MeasuredMode], list[str]]:
                 mean_f, std_f, max(mean_z, 0.0), std_z,
                 (float(np.min(f - SIGMAS * df)), float(np.max(f + SIGMAS * df))),
                 (float(max(np.min(z - SIGMAS * dz), 0.0)), float(max(np.max(z + SIGMAS * dz), 0.0))),
-                float(max(fit.size[k] for fit, k in group)), len(group),
+                float(max(fit.ringing[k] for fit, k in group)), len(group),
             )
         )  # fmt: skip
         if np.ptp(f) > 4 * np.max(df) and np.ptp(f) > 0.01 * mean_f:

@@ -14,6 +14,7 @@ FINE = 6.0  # samples per period of the highest peak at which the Hankel matrix 
 ORDER = 16  # poles, at most
 PEAK = 100.0  # times the median of the spectrum that a peak has to reach to count
 COLUMNS = 3000
+COARSER = (1.0, 3.0, 9.0)  # steps of time, relative to the finest, at which a driven run is looked at
 SHARE = 1e-3  # of the highest peak, below which another is not looked at
 
 
@@ -21,7 +22,8 @@ def first_poles(stretches: list[Stretch]) -> np.ndarray:
     """Candidate poles [rad/s], real ones and one of each pair, in no order."""
     top, low = highest_peak(stretches)
     if len(stretches[0].inputs):
-        return np.concatenate([_driven(s, _heard(s)) for s in stretches])
+        # a step of time that suits high modes hides low ones in noise, and one that suits low ones has no room
+        return np.concatenate([_driven(s, _heard(s) / part) for s in stretches for part in COARSER])
     step = stretches[0].step
     shortest = min(s.outputs.shape[1] for s in stretches)
     stride = max(1, min(int(1 / (FINE * top * step)), shortest // (4 * ORDER)))

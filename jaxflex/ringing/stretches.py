@@ -1,16 +1,19 @@
 """The stretches of a recording that tell how the arm rings: free decays, or all of a driven run."""
 
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ..files.checks import dead
 from ..files.recording import Recording, RecordingError
 
 OUTPUTS = ("strain", "tip_deflection", "tip_acceleration")
-INPUTS = ("reference", "voltage", "torque", "current")
-STILL = 0.01  # share of its range within which an input counts as constant
+DRIVES = ("voltage", "torque", "current")
+INPUTS = ("reference", *DRIVES, "angle")
+STILL = 2e-3  # share of its range within which an input counts as constant
+LEFT = 0.3  # share of its range that a decay still has where it is taken to begin later
 CYCLES = 4.0  # of the strongest peak that a decay has to last
 LEAST = 40  # samples of the shortest stretch
 
@@ -40,12 +43,24 @@ def live(recording: Recording, kinds: tuple[str, ...]) -> list[str]:
     return [name for name in names if not dead(recording[name])]
 
 
-def stretches(recording: Recording) -> list[Stretch]:
-    """Free decays, where the inputs stand still long enough; else each piece as driven.
+def common_inputs(recordings: Sequence[Recording]) -> list[str | None]:
+    """Which kinds of channel may count as what drives the arm, the likeliest first; None if nothing recorded does.
 
-    The reference counts as the input where it is recorded: what a shaper has to cancel
-    are the modes that the reference excites. A run without inputs is one decay, from its
-    largest excursion on.
+    The reference where all have it, for what a shaper has to cancel are the modes that
+    the reference excites. Else the drive's command; and, if that explains little (of a joint
+    that rubs, say), the joint's own angle, whatever moves it.
+    """
+    there = [kind for kind in INPUTS if all(live(recording, (kind,)) for recording in recordings)]
+    if "reference" in there:
+        return ["reference"]
+    drive = next((kind for kind in DRIVES if kind in there), None)
+    return [drive, "angle"] if "angle" in there else [drive]
+
+
+def stretches(recording: Recording, driven_by: str | None) -> list[Stretch]:
+    """Free decays, where the inputs of this kind stand still long enough; else each piece as driven.
+
+    A run without inputs is one decay, from its largest excursion on.
 
     **Raises** `RecordingError` if no channel shows the vibration, or nothing is long enough.
     """
@@ -57,8 +72,11 @@ def stretches(recording: Recording) -> list[Stretch]:
             f"{recording.source}: no channel that shows vibration (found {found}); one of {wanted} "
             "that is not constant is needed."
         )
-    kinds = [kind for kind in INPUTS if live(recording, (kind,))]
-    drives = live(recording, (kinds[0],)) if kinds else []
+    drives = [] if driven_by is None else live(recording, (driven_by,))
+    if driven_by is not None and not drives:
+        raise RecordingError(
+            f"{recording.source}: no channel {driven_by}_1 that changes; found {', '.join(recording.channels)}."
+        )
     found = []
     for piece in recording.split_at_gaps():
         if len(piece) < LEAST:
@@ -74,6 +92,20 @@ def stretches(recording: Recording) -> list[Stretch]:
     return found
 
 
+def later(found: list[Stretch], cycles: float) -> list[Stretch]:
+    """Free decays from `cycles` of the strongest peak after their beginning on, those with enough left."""
+    left = []
+    for s in found:
+        cycle = 1 / (strongest(s.outputs, s.step) * s.step)
+        start = round(cycles * cycle)
+        rest = s.outputs[:, start:]
+        if rest.shape[1] < max(LEAST, CYCLES * cycle):
+            continue
+        if np.any(np.ptp(rest, axis=1) >= LEFT * np.ptp(s.outputs, axis=1)):
+            left.append(replace(s, outputs=rest, inputs=s.inputs[:, start:]))
+    return left
+
+
 def _of_piece(
     step: float, outputs: np.ndarray, inputs: np.ndarray, names: tuple[str, ...], source: str
 ) -> list[Stretch]:
@@ -86,17 +118,23 @@ def _of_piece(
         away = np.abs(outputs - np.median(outputs[:, -count // 4 :], axis=1, keepdims=True))
         start = int(np.argmax(np.max(away / np.maximum(away.max(axis=1, keepdims=True), 1e-300), axis=0)))
         return [cut(start, count, False)] if count - start >= LEAST else []
-    span = STILL * np.ptp(inputs, axis=1, keepdims=True)
-    least = max(LEAST, round(CYCLES / (strongest(outputs, step) * step)))
-    moving = np.any(np.abs(np.diff(inputs, axis=1)) > span, axis=0)
-    edges = [0, *(np.flatnonzero(moving) + 1).tolist(), count]
-    decays = []
-    for start, stop in pairwise(edges):
-        # slow changes are no jumps, but move the input all the same
-        quiet = np.all(np.ptp(inputs[:, start:stop], axis=1) <= 2 * span[:, 0]) if stop > start else False
-        if stop - start >= least and quiet and _rings(outputs, start, stop):
-            decays.append(cut(start, stop, False))
+    least = min(max(LEAST, round(CYCLES / (strongest(outputs, step) * step))), count)
+    decays = [
+        cut(start, stop, False) for start, stop in _still(inputs, least) if _rings(outputs, start, stop)
+    ]
     return decays or [cut(0, count, True)]
+
+
+def _still(inputs: np.ndarray, least: int) -> list[tuple[int, int]]:
+    """Where no input leaves a band of `STILL` of its range within any `least` samples: first and last + 1."""
+    whole = np.ptp(inputs, axis=1, keepdims=True)
+    width = maximum_filter1d(inputs, least, axis=1) - minimum_filter1d(inputs, least, axis=1)
+    middles = np.all(width <= STILL * whole, axis=0)
+    starts = np.flatnonzero(middles[least // 2 : inputs.shape[1] - least + least // 2 + 1])
+    if not len(starts):
+        return []
+    runs = np.split(starts, np.flatnonzero(np.diff(starts) > 1) + 1)
+    return [(int(run[0]), int(run[-1]) + least) for run in runs]
 
 
 def _rings(outputs: np.ndarray, start: int, stop: int) -> bool:

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.signal import lsim
 from typer.testing import CliRunner
 
 import controllers as ctl
@@ -78,6 +79,20 @@ def test_a_second_mode_brings_shapers_for_both(tmp_path):
     assert found["shapers"]["ZV"]["worst_residual_by_mode"][1] > 0.1
 
 
+def test_a_driven_recording_says_what_its_modes_are_of(tmp_path):
+    times = np.arange(0.0, 8.0, 1 / 400)
+    command = np.sin(2 * np.pi * (0.5 + 1.2 * times) * times)
+    omega, zeta = 2 * np.pi * 3.0, 0.03
+    plant = ([omega**2], [1.0, 2 * zeta * omega, omega**2])
+    seen = lsim(plant, command, times)[1] + 0.02 * np.random.default_rng(0).standard_normal(len(times))
+    write_series(tmp_path / "a.csv", times, {"voltage_1": command, "tip_deflection_1": 1e-3 * seen})
+    result = run(tmp_path / "a.csv", "-o", tmp_path)
+    assert result.exit_code == 0, result.output
+    (mode,) = json.loads((tmp_path / "shaper.json").read_text())["modes"]
+    np.testing.assert_allclose([mode["frequency_hz"], mode["damping_ratio"]], [3.0, zeta], rtol=0.01)
+    assert "moved by its drive (voltage)" in " ".join(result.output.split())
+
+
 def test_the_model_over_payloads(tmp_path):
     result = run(LINK, "--payloads", "0.01:0.04:3", "-o", tmp_path)
     assert result.exit_code == 0, result.output
@@ -106,6 +121,9 @@ def test_bad_input_is_one_line_and_status_two(tmp_path):
         ([LINK, LINK], "2 arms"),
         ([good, "--payloads", "0:1:2"], "with an arm only"),
         ([good, "--tolerance", 2], "--tolerance 2"),
+        ([good, "--input", "wind"], "--input wind: allowed are reference"),
+        ([good, "--input", "voltage"], "no channel voltage_1 that changes"),
+        ([LINK, "--input", "angle"], "with recordings only"),
     ):
         result = run(*arguments)
         assert result.exit_code == 2, arguments

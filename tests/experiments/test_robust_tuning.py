@@ -11,7 +11,7 @@ def figures(tmp_path_factory):
 
 @pytest.mark.slow
 def test_the_front_lies_below_the_unshaped_moves(figures):
-    front, unshaped = np.array(figures["front_mm"]), np.array(figures["others_mm"]["unshaped, textbook PD"])
+    front, unshaped = np.array(figures["front_mm"]), np.array(figures["others_mm"]["textbook PD, unshaped"])
     assert np.all(front < unshaped / 2)
     assert np.all(np.array(figures["front_held_out_payloads_mm"]) < unshaped)
 
