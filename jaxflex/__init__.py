@@ -42,6 +42,9 @@ from .beam.basis import MODE_SHAPES as MODE_SHAPES
 from .beam.basis import Distal as Distal
 from .beam.link_model import LinkModel as LinkModel
 
+# Text of models
+from .brief import brief as brief
+
 # What a controller has to be
 from .control import AbstractController as AbstractController
 from .control import AbstractReference as AbstractReference
