@@ -7,6 +7,7 @@ and may excite modes above the one they cancel.
 import equinox as eqx
 import jax.numpy as jnp
 import optimistix as optx
+from jax.core import Tracer
 
 from jaxflex import Scalar, ScalarLike, scalar
 
@@ -19,7 +20,14 @@ ZVD_START = (0.09, 0.37, 0.64, 0.73)
 
 def _alternating(frequency: ScalarLike, damping_ratio: ScalarLike, start: tuple[float, ...]) -> Shaper:
     mode(frequency, damping_ratio)
-    return _solved(scalar(frequency), scalar(damping_ratio), start)
+    shaper = _solved(scalar(frequency), scalar(damping_ratio), start)
+    right = jnp.all(jnp.diff(shaper.delays) > 0) & (shaper.duration() * scalar(frequency) < 1)
+    told = "no impulses of +1 and -1 cancel so damped a mode: damping_ratio up to 0.4 is allowed."
+    if not isinstance(right, Tracer):
+        if not right:
+            raise ValueError(f"unity magnitude at damping_ratio = {scalar(damping_ratio):g}: {told}")
+        return shaper
+    return eqx.error_if(shaper, ~right, f"unity magnitude: {told}")
 
 
 @eqx.filter_jit
@@ -44,10 +52,15 @@ def um_zv(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0) -> Shaper:
 
     Without damping at 0, 1/6 and 1/3 of the period; with it, the times solve the same
     equations by Newton's method.
+
+    **Raises** `ValueError` for a damping ratio above 0.4 or so, where that finds none.
     """
     return _alternating(frequency, damping_ratio, ZV_START)
 
 
 def um_zvd(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0) -> Shaper:
-    """Unity magnitude, zero vibration and derivative: five impulses (Singhose, Singer and Seering 1994)."""
+    """Unity magnitude, zero vibration and derivative: five impulses (Singhose, Singer and Seering 1994).
+
+    **Raises** `ValueError` as `um_zv` does.
+    """
     return _alternating(frequency, damping_ratio, ZVD_START)

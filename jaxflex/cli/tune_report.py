@@ -180,7 +180,7 @@ def write_tune_report(
             paragraph(LAW),
             paragraph(
                 f"The move takes {float(move.duration):.3g} s, with the shaper {float(design.move_time()):.3g} s. "
-                "tuned.toml, beside this page, holds all of it with the arm; the command jaxflex simulate tuned.toml runs it."
+                "tuned.toml, beside this page, holds all of it with the arm; jaxflex simulate tuned.toml runs it."
             ),
             shown("history"),
         ),
