@@ -11,6 +11,7 @@ from jaxflex import (
     AssembledArm,
     Scalar,
     ScalarLike,
+    brief,
     closed_loop_modes,
     linearise,
     locked_frequencies,
@@ -31,6 +32,8 @@ class Design(eqx.Module):
     controller: AbstractController
     move: Move
     shaper: Shaper
+
+    __repr__ = brief
 
     @property
     def reference(self) -> Shaped:

@@ -91,7 +91,15 @@ def rate_shapers(modes: Sequence[MeasuredMode], tolerance: float = 0.05) -> list
             "two modes together": lambda: simultaneous(*both),
         }.items():
             made[name] = (make, CALLS[name].format(**written))
-    rated = [_rate(name, make(), call, modes) for name, (make, call) in made.items()]
+    rated = []
+    for name, (make, call) in made.items():
+        try:
+            shaper = make()
+        except ValueError:  # of unity magnitude there is none for a mode that hardly rings
+            if name not in ALTERNATING:
+                raise
+        else:
+            rated.append(_rate(name, shaper, call, modes))
     return sorted(rated, key=lambda r: r.added_time)
 
 

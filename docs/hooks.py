@@ -1,9 +1,11 @@
-"""Pages that are made of the code: `{{ effects }}`, `{{ api PACKAGE }}` and `{{ file PATH }}`."""
+"""Pages made of the repository: `{{ effects }}`, `{{ api PACKAGE }}`, `{{ file PATH }}`, `{{ experiment NAME }}`."""
 
 import importlib
 import inspect
 import re
 from pathlib import Path
+
+from mkdocs.structure.files import File, Files
 
 from jaxflex import EFFECTS
 
@@ -22,7 +24,27 @@ def on_page_markdown(markdown: str, **_) -> str:
     """Fill in what the code says."""
     markdown = markdown.replace("{{ effects }}", effects())
     markdown = re.sub(r"\{\{ file (\S+) \}\}", lambda found: (ROOT / found[1]).read_text(), markdown)
+    markdown = re.sub(r"\{\{ experiment (\S+) \}\}", lambda found: experiment(found[1]), markdown)
     return re.sub(r"\{\{ api (\w+) \}\}", lambda found: api(found[1]), markdown)
+
+
+def on_files(files: Files, config) -> Files:
+    """Add the pictures of the experiments that pages tell of."""
+    for page in (ROOT / "docs").glob("*.md"):
+        text = page.read_text()
+        told = re.findall(r"\{\{ experiment (\w+) \}\}", text) + re.findall(r"\]\((\w+)/\w+\.png\)", text)
+        for name in told:
+            for path in (ROOT / "experiments" / name).glob("*.png"):
+                files.append(File.generated(config, f"{name}/{path.name}", abs_src_path=str(path)))
+    return files
+
+
+def experiment(name: str) -> str:
+    """What an experiment found, from its README, its headings one level down and its pictures beside the page."""
+    text = (ROOT / "experiments" / name / "README.md").read_text()
+    text = re.sub(r"^#", "##", text, flags=re.M)
+    text = re.sub(r"(?<!!)\[([^]]*)\]\((?!http)[^)]+\)", r"\1", text)  # to files that stay where they are
+    return re.sub(r"!\[([^]]*)\]\(([^)]+)\)", rf"![\1]({name}/\2)", text)
 
 
 def effects() -> str:

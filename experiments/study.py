@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jaxflex.cli.runtime import prepare
+from jaxflex import set_up
 
 
 def command(run: Callable[[Path, bool], dict[str, Any]], file: str) -> None:
@@ -19,7 +19,7 @@ def command(run: Callable[[Path, bool], dict[str, Any]], file: str) -> None:
     parser.add_argument("--reduced", action="store_true", help="a smaller form, as the tests run it")
     parser.add_argument("-o", type=Path, default=Path(file).parent, help="where figures and pictures go")
     given = parser.parse_args()
-    prepare()
+    set_up()
     given.o.mkdir(parents=True, exist_ok=True)
     figures = run(given.o, given.reduced)
     (given.o / "figures.json").write_text(json.dumps(figures, indent=1) + "\n")

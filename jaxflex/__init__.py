@@ -37,10 +37,16 @@ from .arm.energy import potential_energy as potential_energy
 from .arm.kinematics import tip_position as tip_position
 from .arm.library import ahmad_arm as ahmad_arm
 from .arm.library import foldager_link as foldager_link
+from .arm.parts import AbstractLink as AbstractLink
 from .arm.parts import Joint as Joint
 from .arm.parts import Link as Link
 from .arm.parts import Payload as Payload
 from .beam.basis import MODE_SHAPES as MODE_SHAPES
+from .beam.basis import Distal as Distal
+from .beam.link_model import LinkModel as LinkModel
+
+# Text of models
+from .brief import brief as brief
 
 # What a controller has to be
 from .control import AbstractController as AbstractController

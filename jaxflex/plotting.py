@@ -5,7 +5,6 @@ from io import BytesIO
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 TITLES = {
@@ -22,6 +21,7 @@ TITLES = {
     "tip_y": "tip position y",
 }
 BEFORE, AFTER = "#c44e52", "#2a6f97"
+WIDTH = 5.0  # inches: legible across a telephone, two side by side across a desk
 
 
 class Picture(Figure):
@@ -47,39 +47,28 @@ def _shades(count: int):
     return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
 
 
-def plot_before_after(
-    times: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    ends: tuple[float, float],
-    payloads: Sequence[float],
-    labels: tuple[str, str],
+def plot_bending(
+    times: np.ndarray, bends: np.ndarray, end: float, payloads: Sequence[float], top: float
 ) -> Figure:
-    """Tip deflection of every link for every payload, before and after tuning.
+    """Tip deflection of every link for every payload, up to `top` [m] either way.
 
-    `before`, `after`: `(payloads, times, links)` [m]; `ends` [s] of the commanded moves.
+    `bends`: `(payloads, times, links)` [m]; `end` [s] of the commanded move.
     """
-    links = before.shape[-1]
-    figure, axes = panels(links, 2, height=2.8)
-    for column, (runs, end, label) in enumerate(zip((before, after), ends, labels, strict=True)):
-        for row in range(links):
-            axis: Axes = axes[row, column]
-            for run, payload, shade in zip(runs, payloads, _shades(len(payloads)), strict=True):
-                axis.plot(times, 1e3 * run[:, row], color=shade, label=f"{1e3 * payload:.0f} g", linewidth=1)
-            axis.axvline(end, color="0.4", linestyle=":", linewidth=1)
-            axis.annotate(
-                "end of move", (end, 1.0), xycoords=("data", "axes fraction"),
-                xytext=(3, -9), textcoords="offset points", fontsize=7, color="0.3",
-            )  # fmt: skip
-            axis.set_ylabel(f"tip deflection, link {row + 1} [mm]")
-        axes[0, column].set_title(label, fontsize=10)
-        axes[-1, column].set_xlabel("time [s]")
-    for row in range(links):
-        low = min(axes[row, c].get_ylim()[0] for c in (0, 1))
-        high = max(axes[row, c].get_ylim()[1] for c in (0, 1))
-        for c in (0, 1):
-            axes[row, c].set_ylim(low, high)
-    axes[0, 1].legend(title="payload", fontsize=7, title_fontsize=7, frameon=False, ncols=2)
+    links = bends.shape[-1]
+    figure, axes = panels(links, 1, height=2.8 if links == 1 else 2.2, width=WIDTH)
+    for link, axis in enumerate(axes[:, 0]):
+        for run, payload, shade in zip(bends, payloads, _shades(len(payloads)), strict=True):
+            axis.plot(times, 1e3 * run[:, link], color=shade, label=f"{1e3 * payload:.0f} g", linewidth=1)
+        axis.axvline(end, color="0.4", linestyle=":", linewidth=1)
+        axis.annotate(
+            "end of move", (end, 0.0), xycoords=("data", "axes fraction"),
+            xytext=(3, 4), textcoords="offset points", fontsize=8, color="0.3",
+        )  # fmt: skip
+        axis.set_ylim(-1e3 * top, 1e3 * top)
+        axis.set_ylabel(f"tip deflection{f', link {link + 1}' if links > 1 else ''} [mm]")
+    axes[-1, 0].set_xlabel("time [s]")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, frameon=False, loc="outside upper right", ncols=4)
     return figure
 
 
@@ -87,7 +76,7 @@ def plot_residual(
     payloads: np.ndarray, residual: Mapping[str, np.ndarray], tuned: str, tuned_on: Sequence[float]
 ) -> Figure:
     """Residual vibration [m] against payload [kg] for every design, the tuning payloads marked."""
-    figure, axes = panels(1, 1, height=4.6)
+    figure, axes = panels(1, 1, height=5.0, width=WIDTH)
     axis = axes[0, 0]
     for i, (name, values) in enumerate(residual.items()):
         best = name == tuned
@@ -105,7 +94,7 @@ def plot_residual(
     axis.set_xlabel("payload [g]")
     axis.set_ylabel("residual tip vibration, peak to peak [mm]")
     axis.grid(True, which="both", alpha=0.25, linewidth=0.5)
-    axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.legend(fontsize=8, frameon=False, loc="outside lower center", ncols=3)
     return figure
 
 
@@ -121,7 +110,7 @@ def plot_spectra(
 
     `before`, `after`: `(payloads, frequencies)`; shown up to `top` [Hz].
     """
-    figure, axes = panels(1, 1, height=3.8)
+    figure, axes = panels(1, 1, height=3.8, width=WIDTH)
     axis = axes[0, 0]
     shown = (frequencies > 0) & (frequencies <= top)
     f = frequencies[shown]
@@ -181,10 +170,10 @@ def plot_modes(payloads: np.ndarray, families: Mapping[str, np.ndarray]) -> Figu
 
 def plot_history(histories: Sequence[Sequence[float]]) -> Figure:
     """Cost of the best design so far against the step, for every descent."""
-    figure, axes = panels(1, 1, height=3.0, width=6.0)
+    figure, axes = panels(1, 1, height=2.6, width=WIDTH)
     for number, history in enumerate(histories, 1):
         axes[0, 0].plot(np.arange(1, len(history) + 1), history, label=f"descent {number}")
-    axes[0, 0].set_xlabel("step")
+    axes[0, 0].set_xlabel("step [1]")
     axes[0, 0].set_ylabel("cost (logarithmic) [1]")
     axes[0, 0].legend(frameon=False, fontsize=8)
     return figure

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from .arm.arm import Arm, AssembledArm
 from .arm.kinematics import poses
+from .arm.parts import Link
 from .scalars import Scalar, scalar
 from .simulation.trajectory import Trajectory
 
@@ -110,13 +111,13 @@ def _deflections(
 ) -> Float[Array, "points shapes"]:
     """The deflection shapes of link `i` at `along` of its length.
 
-    Of an assumed-modes link its own; of a lumped one the cubic with the same tip.
+    Of an assumed-modes link its own; of any other the cubic with the same tip.
     """
     link, constants, joint = model.arm.links[i], model.links[i], model.joints[i]
     if link.modes == 0:
         return jnp.zeros((_POINTS, 0))
     tip, slope = jnp.stack(constants.tip_deflection), link.length * jnp.stack(constants.tip_slope)
-    if link.model == "lumped":
+    if not isinstance(link, Link) or link.model == "lumped":
         u = along[:, None]
         return (3 * u**2 - 2 * u**3) * tip + (u**3 - u**2) * slope
     basis = link.basis(model.arm.distal(i), i + 1 < len(model.arm.links), joint.compliance)

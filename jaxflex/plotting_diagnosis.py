@@ -13,13 +13,14 @@ from scipy.signal import find_peaks
 from .analysis.measures import spectrum
 from .diagnosis.locate import LatentForce
 from .diagnosis.result import Comparison, Gap
-from .plotting import AFTER, BEFORE, TITLES, panels
+from .plotting import AFTER, BEFORE, TITLES, WIDTH, panels
 from .sensors import unit
 
-WIDTH = 5.0  # inches: legible across a telephone, two side by side across a desk
 BINS = 30
-FEWEST = 4  # points that a bin's mean is drawn from
-TAILS = (0.5, 99.5)  # per cent: what lies outside is left out of a picture of a force
+FEWEST = 4  # points that a bin's median is drawn from
+BAND = (16, 50, 84)  # per cent: what is drawn of a bin, which a few wild estimates do not move
+TAILS = (0.5, 99.5)  # per cent of the moments: what lies outside is left out of a picture
+WILD = (3.0, 97.0)  # the same of the forces, of which an estimate has some that are far off
 MOST = 2.0  # heights of the force before that the one after may add to its picture
 SMOOTHED = 5  # neighbours that a spectrum is averaged over
 PROMINENCE = 1.0  # decades that a peak stands above both of its sides
@@ -132,18 +133,18 @@ def plot_prediction(comparison: Comparison, channel: str, floor: float) -> Figur
 
 
 def plot_force(view: View, before: LatentForce, after: LatentForce) -> Figure:
-    """The missing force before and after against one quantity: points, binned mean and band of one std."""
+    """The missing force before and after against one quantity: points, binned median and band of two thirds."""
     figure, axes = panels(1, 1, height=3.1, width=WIDTH)
     axis = axes[0, 0]
     x = [view.quantity(force) for force in (before, after)]
-    edges = np.linspace(*_spread(np.concatenate(x)), BINS + 1)
+    edges = np.linspace(*_spread(np.concatenate(x), TAILS), BINS + 1)
     for place, force, colour, label in zip(
         x, (before, after), (BEFORE, AFTER), ("before", "after"), strict=True
     ):
         _cloud(axis, place, force.values, edges, colour, label)
     axis.set_xlim(edges[0], edges[-1])
-    low, high = _spread(before.values)
-    lowest, highest = _spread(np.concatenate([before.values, after.values]))
+    low, high = _spread(before.values, WILD)
+    lowest, highest = _spread(np.concatenate([before.values, after.values]), WILD)
     room = MOST * (high - low)  # an estimate that ran away must not hide the other
     axis.set_ylim(max(lowest, low - room), min(highest, high + room))
     axis.axhline(0.0, color="0.4", linewidth=0.6)
@@ -193,9 +194,9 @@ def _force_label(force: LatentForce) -> str:
     return f"{kind} that is missing [{force.unit}]"
 
 
-def _spread(values: np.ndarray) -> tuple[float, float]:
+def _spread(values: np.ndarray, tails: tuple[float, float]) -> tuple[float, float]:
     """Limits that show all but the tails, with a margin."""
-    low, high = np.percentile(values[np.isfinite(values)], TAILS)
+    low, high = np.percentile(values[np.isfinite(values)], tails)
     margin = 0.08 * (high - low) or 1.0
     return low - margin, high + margin
 
@@ -205,8 +206,8 @@ def _cloud(axis: Axes, x: np.ndarray, y: np.ndarray, edges: np.ndarray, colour: 
     axis.plot(x[::step], y[::step], ".", color=colour, markersize=2, alpha=0.3, zorder=1)
     place = np.searchsorted(edges, x, side="right") - 1
     bins = [y[place == b] for b in range(BINS)]
-    mean = np.array([b.mean() if len(b) >= FEWEST else np.nan for b in bins])
-    spread = np.array([b.std() if len(b) >= FEWEST else np.nan for b in bins])
+    nothing = np.full(3, np.nan)
+    low, median, high = np.array([np.percentile(b, BAND) if len(b) >= FEWEST else nothing for b in bins]).T
     middle = (edges[:-1] + edges[1:]) / 2
-    axis.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.2, linewidth=0, zorder=2)
-    axis.plot(middle, mean, color=colour, linewidth=2, label=label, zorder=3)
+    axis.fill_between(middle, low, high, color=colour, alpha=0.2, linewidth=0, zorder=2)
+    axis.plot(middle, median, color=colour, linewidth=2, label=label, zorder=3)

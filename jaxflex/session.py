@@ -25,7 +25,8 @@ def set_up(
 
     Call it first: once JAX has computed something its compiler options are fixed, and a
     warning says so. Options already in the environment variable XLA_FLAGS stand. With
-    `cache=None` nothing is kept between sessions.
+    `cache=None` nothing is kept between sessions; where there is a cache, the environment
+    variable JAXFLEX_CACHE may say another place.
 
     `devices`: into how many the CPU is divided for `sweep`, one a core that this process may
     use unless told.
@@ -55,7 +56,8 @@ def set_up(
     if not _backend_runs():
         jax.config.update("jax_num_cpu_devices", devices or len(os.sched_getaffinity(0)))
     if cache is not None:
-        jax.config.update("jax_compilation_cache_dir", str(Path(cache).expanduser()))
+        folder = Path(os.environ.get("JAXFLEX_CACHE", cache)).expanduser()
+        jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 

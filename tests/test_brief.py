@@ -17,6 +17,8 @@ PARTS = {
     "six joints": jf.Arm((), (jf.Joint(hub_inertia=1.0),) * 20),
     "assembled": ARM.assemble(),
     "reference": ctl.Shaped(MOVE, ctl.zvd(4.0)),
+    "shaper": ctl.zvd(4.0),
+    "design": ctl.Design(ctl.PD((3.0, 0.4), (9.0, 0.8)), MOVE, ctl.zvd(4.0)),
     "gains": ctl.PD((3.0, 0.4), (9.0, 0.8)),
     "recording": jf.Recording(np.linspace(0, 1, 10_000), {"angle_1": np.zeros(10_000)}, source="run.csv"),
     "linear": jf.linearise(jf.foldager_link(modes=1), jnp.zeros(1), channels=("angle_1",)),

@@ -10,7 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from jaxflex import AbstractReference, Scalar, ScalarLike, scalar
+from jaxflex import AbstractReference, Scalar, ScalarLike, brief, scalar
 
 Impulses = Float[Array, " impulses"]
 
@@ -23,6 +23,8 @@ class Shaper(eqx.Module):
 
     amplitudes: Impulses
     delays: Impulses
+
+    __repr__ = brief
 
     def duration(self) -> Scalar:
         """Time [s] by which the shaper lengthens a move."""

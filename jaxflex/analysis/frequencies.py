@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..arm.arm import Arm, AssembledArm
-from ..arm.parts import Joint
+from ..arm.parts import Joint, Link
 from ..beam.basis import make_basis
 from ..beam.eigen import whiten
 from ..beam.mode_shapes import natural_frequencies as beam_frequencies
@@ -64,17 +64,19 @@ def _locked(model: AssembledArm, pose: JointVector | None) -> Float[Array, " sha
     return undamped_frequencies(jnp.diag(jnp.stack(model.stiffness()[n:])), mass)
 
 
+@eqx.filter_jit
 def clamped_frequencies(arm: Arm, link: int) -> Float[Array, " modes"]:
     """Frequencies [Hz] of link `link` clamped at its root with all that hangs on it at its tip.
 
     Of an assumed-modes link these are the roots of the frequency equation of Ahmad et
-    al. (23) with the distal mass and inertia; of a lumped link, those of its chain.
+    al. (23) with the distal mass and inertia; of a lumped link, those of its chain;
+    of any other link, those of its own shapes.
     """
     part = arm.links[link]
     if part.modes == 0:
         return jnp.zeros(0)
     distal = arm.distal(link)
-    if part.model == "lumped":
+    if not isinstance(part, Link) or part.model == "lumped":
         constants = part.discretise(distal, link + 1 < len(arm.links), Joint())
         tip, slope = jnp.stack(constants.tip_deflection), jnp.stack(constants.tip_slope)
         mass = jnp.array(constants.modal_inertia) + distal.mass * jnp.outer(tip, tip)

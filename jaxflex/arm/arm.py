@@ -1,6 +1,7 @@
 """An arm: links, joints and payload in series, and the same arm with its constants computed."""
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ from ..beam.link_model import LinkModel, rigid_link
 from ..brief import brief
 from ..effects import AbstractBodyEffect, AbstractEffect
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
-from .parts import Joint, Link, Payload
+from .parts import AbstractLink, Joint, Link, Payload
 
 DRIVES = ("voltage", "current", "torque")
 
@@ -25,8 +26,8 @@ class Arm(eqx.Module):
 
     **Fields**
 
-    - `links`, `joints`: from base to tip; a joint without a link is a motor axis with
-      inertia only
+    - `links` (each a `Link` or another `AbstractLink`), `joints`: from base to tip; a joint without a
+      link is a motor axis with inertia only
     - `payload`: at the tip
     - `gravity` [m/s^2] along -y of the base; None for a horizontal arm
     - `drive`: what the controller commands: `"voltage"`, `"current"` or `"torque"`
@@ -39,7 +40,7 @@ class Arm(eqx.Module):
     with `shortening=1` on the links, up to twice that frequency.
     """
 
-    links: tuple[Link, ...]
+    links: tuple[Any, ...]
     joints: tuple[Joint, ...]
     payload: Payload = eqx.field(default_factory=Payload)
     gravity: Scalar | None = eqx.field(converter=optional_scalar, default=None)
@@ -58,6 +59,11 @@ class Arm(eqx.Module):
                 f"an arm has a joint at the root of each link: {len(self.links)} links "
                 f"need as many joints, found {len(self.joints)}."
             )
+        for link in self.links:
+            if not isinstance(link, AbstractLink):
+                raise ValueError(
+                    f"an arm's links are Link or another AbstractLink, not {type(link).__name__}."
+                )
         if self.drive not in DRIVES:
             raise ValueError(f"drive = {self.drive!r} is unknown; allowed are {', '.join(DRIVES)}.")
         if self.drive != "torque":
@@ -124,12 +130,12 @@ class Arm(eqx.Module):
         for joint in self.joints[max(link + 1, len(self.links)) :]:
             mass = mass + joint.hub_mass
             inertia = inertia + joint.hub_inertia + joint.hub_mass * reach**2
-        root = self.joints[link]
+        root, own = self.joints[link], self.links[link]
         return Distal(
             mass=mass + self.payload.mass,
             inertia=inertia + self.payload.inertia + self.payload.mass * reach**2,
             hub_inertia=root.hub_inertia + root.reflected_inertia,
-            root_stiffness=self.links[link].root_stiffness,
+            root_stiffness=own.root_stiffness if isinstance(own, Link) else scalar(0.0),
         )
 
     @eqx.filter_jit

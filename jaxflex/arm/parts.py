@@ -1,5 +1,7 @@
 """The parts of an arm as an engineer describes them: links, joints, payload."""
 
+from abc import abstractmethod
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
@@ -23,7 +25,31 @@ def damping_ratios(value: "ScalarLike | str | tuple[ScalarLike, ...]") -> tuple[
 MOTIONS = ("finite", "small")
 
 
-class Link(eqx.Module):
+class AbstractLink(eqx.Module):
+    """What an arm asks of a link. Derive from it for one that is not slender or not uniform.
+
+    - `length` [m]
+    - `thickness` [m] in the plane of bending, None where no strain is asked for
+    - `modes`: number of mode shapes (0: a rigid link)
+
+    The shapes of the links before it are chosen as if its mass were spread evenly.
+    """
+
+    length: eqx.AbstractVar[Scalar]
+    thickness: eqx.AbstractVar[Scalar | None]
+    modes: eqx.AbstractVar[int]
+
+    @property
+    @abstractmethod
+    def mass(self) -> Scalar:
+        """Mass of the link [kg]."""
+
+    @abstractmethod
+    def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
+        """The constants of the link between its `joint` and what it carries, `distal`."""
+
+
+class Link(AbstractLink):
     """A slender uniform link that bends in the plane of motion (Ahmad et al., assumptions I-V).
 
     **Fields**

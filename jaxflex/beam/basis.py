@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..brief import brief
 from ..scalars import Scalar, scalar
 from .boundary import Ends
 from .eigen import whiten
@@ -36,6 +37,8 @@ class Distal(eqx.Module):
     inertia: Scalar
     hub_inertia: Scalar
     root_stiffness: Scalar
+
+    __repr__ = brief
 
 
 class Basis(eqx.Module):

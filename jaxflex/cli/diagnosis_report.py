@@ -33,8 +33,8 @@ PREDICTIONS = (
 )
 FORCES = (
     "What would have to act, moment by moment, for the model to be right: before anything was added, and "
-    "after. Its shape is its name. A point is a moment, the line their mean, the band "
-    "one standard deviation; the outermost hundredth is left out. What is wrong with a sensor is no force and "
+    "after. Its shape is its name. A point is a moment, the line their median, the band "
+    "two thirds of them; the few that are far off are left out. What is wrong with a sensor is no force and "
     "has no clear shape here."
 )
 EVIDENCE = (

@@ -36,11 +36,12 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap;
          vertical-align: top; }
 .words { text-align: left; }
+.words:first-child { position: sticky; left: 0; background: var(--paper); min-width: 6.5rem; }
 @media (max-width: 32rem) {
   th, td { padding: .25rem .35rem; }
   .words { white-space: normal; }
 }
-tr.best td { background: var(--best); font-weight: 600; }
+tr.best td, tr.best .words:first-child { background: var(--best); font-weight: 600; }
 """
 
 

@@ -1,6 +1,5 @@
 """What every command does first: precision, compilation cache, and clear errors."""
 
-import os
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -23,17 +22,12 @@ class UsageError(ValueError):
     """Bad input from the command line; the message says what is allowed."""
 
 
-def prepare() -> None:
-    """`set_up`, its cache in `~/.cache/jaxflex` or where JAXFLEX_CACHE says."""
-    set_up(os.environ.get("JAXFLEX_CACHE", "~/.cache/jaxflex"))
-
-
 def command(function: Callable) -> Callable:
     """A command that prepares JAX and turns bad input into one line and exit status 2."""
 
     @wraps(function)
     def run(*args, **kwargs):
-        prepare()
+        set_up()
         try:
             return function(*args, **kwargs)
         except (ArmFileError, RecordingError, UsageError, SimulationError) as error:

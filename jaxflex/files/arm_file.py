@@ -268,12 +268,19 @@ def save_arm(
     """Write `arm` to `path`, so that `read_arm_file` gives it back.
 
     Sections are written as `mass_per_length` and `flexural_rigidity`.
+
+    **Raises** `ValueError` for a link of another class than `Link`.
     """
     lines = [f"name = {_toml(arm.name)}"]
     lines.append(f"gravity = {_toml(0.0 if arm.gravity is None else arm.gravity)}")
     if arm.side_gravity is not None:
         lines.append(f"side_gravity = {_toml(arm.side_gravity)}")
-    for link in arm.links:
+    for number, link in enumerate(arm.links, 1):
+        if not isinstance(link, Link):
+            raise ValueError(
+                f"link {number} is a {type(link).__name__}; an arm file holds links of the class Link "
+                "alone: keep this arm with save_model."
+            )
         lines += ["", "[[link]]", *_pairs(link, ("damping_ratio",))]
         ratios = link.damping_ratio
         if isinstance(ratios, str):

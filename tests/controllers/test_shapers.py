@@ -222,6 +222,7 @@ def test_padding_changes_nothing():
         (lambda: si(1.0, 0.0, 1.4), "allowed is 0 to 0.9"),
         (lambda: si(1.0, 0.0, 0.4, 0.9), "0.01 to 0.5"),
         (lambda: um_zv(0.0), "positive"),
+        (lambda: um_zv(1.0, 0.8), "up to 0.7"),
     ],
 )
 def test_what_cannot_be_shaped_is_refused(make, message):

@@ -1,0 +1,1 @@
+"""Notebooks, executed and stored with their outputs; `python -m experiments.notebooks` runs them again."""
