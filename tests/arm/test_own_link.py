@@ -47,7 +47,9 @@ def test_it_moves_and_rings_as_the_same_link_of_the_library():
     times = jnp.linspace(0.0, 0.3, 31)
 
     def final(arm):
-        run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.02,), 0.05), times, channels=("tip_y",), method=jf.Fixed())
+        run = jf.simulate(
+            arm, OpenLoop(), Step((0.0,), (0.02,), 0.05), times, channels=("tip_y",), method=jf.Fixed()
+        )
         return run["tip_y"][-1]
 
     @jax.jit
