@@ -1,5 +1,6 @@
 """Double precision for every test, a compilation cache off, and the data that is kept elsewhere."""
 
+import gc
 from pathlib import Path
 
 import jax
@@ -8,6 +9,14 @@ import pytest
 jax.config.update("jax_enable_x64", True)
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_programs():
+    """Programs of one module are dropped after it: those of all would take some gigabytes a worker."""
+    yield
+    jax.clear_caches()
+    gc.collect()
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,6 @@ import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -22,7 +21,6 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
-from ..arm.arm import Arm
 from .delay import delayed
 from .normal import Normal, solve
 from .parameters import Parameters
@@ -91,21 +89,23 @@ def _stacked(columns: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
     return np.stack(columns, -1) if columns else np.zeros((*shape, 0))
 
 
-@eqx.filter_jit
-def _assembled_along(arm: Arm, directions: Any) -> Any:
-    arrays, static = eqx.partition(arm, eqx.is_inexact_array)
-
-    def assembled(arrays):
-        return eqx.filter(eqx.combine(arrays, static).assemble(), eqx.is_inexact_array)
-
-    return jax.vmap(lambda d: jax.jvp(assembled, (arrays,), (d,))[1])(directions)
-
-
 class Problem:
     """What turns runs and parameters into least squares."""
 
     def __init__(self, setting: Setting):
         self.setting = setting
+        build = setting.parameters.build
+
+        def assembled(vector):
+            return build(vector).assemble()
+
+        def along(vector, direction):
+            return jax.jvp(lambda v: eqx.filter(assembled(v), eqx.is_inexact_array), (vector,), (direction,))[
+                1
+            ]
+
+        self._model = eqx.filter_jit(assembled)
+        self._tangents = eqx.filter_jit(jax.vmap(along, (None, 0)))
         self._delay = [
             next(
                 (
@@ -129,19 +129,6 @@ class Problem:
             jnp.asarray((1 + joints if joints > 1 else 2) if dry else 1),
             jnp.asarray(s.parameters.lightness),
         )
-
-    def arm(self, vector: np.ndarray) -> Arm:
-        """The arm that a parameter vector stands for."""
-        return self.setting.parameters.build(jnp.asarray(vector))
-
-    def _tangents(self, vector: np.ndarray, directions: np.ndarray) -> Any:
-        at = jnp.asarray(vector)
-
-        def along(direction):
-            moved = jax.jvp(self.setting.parameters.build, (at,), (direction,))[1]
-            return eqx.filter(moved, eqx.is_inexact_array)
-
-        return _assembled_along(self.arm(vector), jax.vmap(along)(jnp.asarray(directions)))
 
     def instruments(self, vector: np.ndarray) -> Instruments:
         """The instruments that a parameter vector stands for."""
@@ -182,7 +169,7 @@ class Problem:
         """What the pieces of a run show from their starts."""
         pieces, _ = self.pieces(run, vector)
         found = respond(
-            self.arm(vector).assemble(), self.instruments(vector), self.setting.channels,
+            self._model(jnp.asarray(vector)), self.instruments(vector), self.setting.channels,
             jnp.asarray(run.starts), pieces,
         )  # fmt: skip
         return Response(*(np.asarray(part) for part in found))
@@ -230,7 +217,7 @@ class Problem:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slopes of readings and ends by the starts, then by columns, then by forcing; last axis."""
         s = self.setting
-        model, instruments = self.arm(vector).assemble(), self.instruments(vector)
+        model, instruments = self._model(jnp.asarray(vector)), self.instruments(vector)
         pieces, delay_slope = self.pieces(run, vector)
         states, joints, size = run.starts.shape[1] if starts else 0, run.command.shape[1], model.size
         more = 0 if forcing is None else len(forcing)
@@ -253,7 +240,7 @@ class Problem:
         def some(first):
             part = slice(first, first + LANES)
             direction = Direction(
-                self._tangents(vector, unit[part]), self._instruments_along(unit[part]),
+                self._tangents(jnp.asarray(vector), jnp.asarray(unit[part])), self._instruments_along(unit[part]),
                 jnp.asarray(start[part, None, :]), jnp.asarray(command[part]), jnp.asarray(force[part]),
             )  # fmt: skip
             found = slopes(model, instruments, s.channels, jnp.asarray(run.starts), pieces, direction)

@@ -60,14 +60,14 @@ def test_shapes_are_tangent_orthogonal_and_scaled(kind):
 
 def test_gradients_of_frequencies():
     def lowest(payload, length, rigidity):
-        arm = ahmad_arm(payload)
+        arm = foldager_link(payload, modes=2)
         links = tuple(
             dataclasses.replace(link, length=length, flexural_rigidity=rigidity) for link in arm.links
         )
         arm = dataclasses.replace(arm, links=links)
-        return locked_frequencies(arm)[1] + driven_frequencies(arm)[3]
+        return locked_frequencies(arm)[1] + driven_frequencies(arm)[1]
 
-    point = (0.03, 0.5, 1.0)
+    point, lowest = (0.03, 0.4, 0.7), jax.jit(lowest)
     forward = jax.jit(jax.jacfwd(lowest, (0, 1, 2)))(*point)
     backward = jax.jit(jax.grad(lowest, (0, 1, 2)))(*point)
     for i in range(3):
@@ -80,14 +80,14 @@ def test_gradients_of_frequencies():
 
 
 def test_lumped_link_converges_to_assumed_modes():
-    exact = locked_frequencies(foldager_link(0.02, modes=6))[:3]
+    exact = locked_frequencies(foldager_link(0.02, modes=6))[:2]
     errors = []
-    for segments in (10, 20, 40):
-        lumped = locked_frequencies(foldager_link(0.02, model="lumped", segments=segments))[:3]
+    for segments in (6, 12, 24):
+        lumped = locked_frequencies(foldager_link(0.02, model="lumped", segments=segments))[:2]
         errors.append(np.abs(np.asarray(lumped / exact - 1)))
     ratio = errors[0] / errors[1], errors[1] / errors[2]
     np.testing.assert_allclose(ratio, 4.0, rtol=0.25)  # second order in the length of a segment
-    assert np.all(errors[-1] < 2e-3)
+    assert np.all(errors[-1] < 3e-3)
 
 
 def test_lumped_link_with_hub_and_root_spring():

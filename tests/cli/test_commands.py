@@ -93,7 +93,7 @@ def test_tune_writes_a_design_that_simulate_loads(tmp_path):
         (["modes", "--payloads", "3:1"], "allowed are FIRST:LAST:COUNT"),
         (["modes", "--payloads=-1:1:3"], "none below 0"),
         (["modes", "--pose", "1"], "2 number(s)"),
-        (["simulate", "--input", "dance"], "allowed are move, step, bang-bang or a CSV file"),
+        (["simulate", "--input", "dance"], "allowed are move, step, bang-bang or a recording"),
         (["simulate", "--input", "no.csv"], "no.csv: cannot be read"),
         (["simulate", "--dt", "0"], "a positive number of seconds"),
         (["simulate", "--duration", "-1"], "more than --dt"),

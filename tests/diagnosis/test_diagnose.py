@@ -60,6 +60,7 @@ def shared(*parts):
     return folder
 
 
+@pytest.mark.slow
 def test_friction_of_a_measured_axis():
     """EMPS (Janot et al. 2019): published M = 95.1 kg, Fc = 20.4 N, and an offset."""
     found = answer(shared("data", "emps"))

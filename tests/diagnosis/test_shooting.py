@@ -66,7 +66,7 @@ def test_pieces_joined_are_the_simulation(prepared):
     vector = problem.setting.parameters.start
     pieces, _ = problem.pieces(whole, vector)
     starts = np.zeros_like(whole.starts)
-    model = problem.arm(vector).assemble()
+    model = problem.setting.parameters.build(jnp.asarray(vector)).assemble()
     starts[0] = start
     for j in range(whole.pieces - 1):
         found = respond(

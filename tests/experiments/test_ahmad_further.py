@@ -20,16 +20,19 @@ def test_sag_of_one_link_is_that_of_the_textbook():
     np.testing.assert_allclose(sag(tilted(arm, 2.0))[0], -exact / 0.5, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_arm_cannot_carry_itself_upright(figures):
     assert abs(figures["sag_pct_of_length"]["two links, base tilted by 90 deg"][0]) > 50
 
 
+@pytest.mark.slow
 def test_a_heavier_payload_drags_a_tilted_arm_further_from_its_target(figures):
     for design in figures["designs"]["two links, base tilted by 1 deg"].values():
         assert np.all(np.diff(design["residual_vibration_mm"]) > 0)
         assert max(design["peak_voltage_V"]) <= 24.0
 
 
+@pytest.mark.slow
 def test_three_links_are_an_arm_of_three(figures):
     arm = three_links(0.05)
     rigid = jf.driven_frequencies(arm, jnp.array([0.3, 0.4, -0.5]))[:3]

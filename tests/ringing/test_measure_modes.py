@@ -135,6 +135,7 @@ def test_what_does_not_ring_is_an_error(recording, message):
         jf.measure_modes([recording])
 
 
+@pytest.mark.slow
 def test_measured_flexible_link(shared):
     path = shared / "data" / "quanser_flexible_link" / "run_1.csv"
     if not path.is_file():

@@ -1,0 +1,54 @@
+"""What does the diagnosis find in recordings of real machines?"""
+
+from pathlib import Path
+
+import jaxflex as jf
+
+from .force import force_error, least_error
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
+MACHINES = ("emps", "quanser_flexible_link")
+
+
+def diagnosed(machine: str) -> tuple[jf.Recording, jf.Diagnosis]:
+    """The recording of a machine, and what the diagnosis says of it."""
+    file, recording = (
+        jf.read_arm_file(DATA / machine / "arm.toml"),
+        jf.read_recording(DATA / machine / "run_1.csv"),
+    )
+    return recording, jf.diagnose(file, [recording])
+
+
+def figures_of(found: jf.Diagnosis) -> dict:
+    """What was named, what was calibrated, and the gap."""
+    return {
+        "verdict": found.verdict,
+        "effects": {
+            f"{effect.name} at {effect.location}": {
+                key: [part.value, part.std, part.unit] for key, part in effect.parameters.items()
+            }
+            for effect in (*found.effects, *found.alternatives)
+        },
+        "alternatives": [effect.name for effect in found.alternatives],
+        "calibrated": {key: [part.value, part.std, part.unit] for key, part in found.calibrated.items()},
+        "gap_explained": found.explained,
+        "after_over_before": {c: found.gap.after[c] / found.gap.before[c] for c in found.gap.before},
+        "after_over_floor": {c: found.gap.after[c] / found.gap.noise_floor[c] for c in found.gap.before},
+        "seconds": found.seconds,
+    }
+
+
+def run(folder: Path, reduced: bool) -> dict:
+    """Diagnose the positioning system and the flexible link; reduced: the first alone."""
+    if not DATA.is_dir():
+        raise SystemExit(f"the recordings are not here: {DATA} is absent")
+    figures = {}
+    for machine in MACHINES[:1] if reduced else MACHINES:
+        recording, found = diagnosed(machine)
+        figures[machine] = figures_of(found)
+        if "torque_1" in recording.channels and not found.improved.links:
+            figures[machine]["relative_force_error"] = {
+                "best inertia and viscous friction": least_error(recording),
+                "with what was named": force_error(found.improved, recording),
+            }
+    return figures
