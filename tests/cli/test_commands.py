@@ -81,7 +81,8 @@ def test_tune_writes_a_design_that_simulate_loads(tmp_path):
         assert len(tuned[key]) == 3
     assert {"ZV", "ZVD", "ZVDD", "EI", "PD, untuned"} <= set(found["designs"])
     page = (tmp_path / "report.html").read_text()
-    assert page.count("data:image/png;base64") == 4 and "http" not in page
+    assert page.count("data:image/png;base64") == 5 and "http" not in page
+    assert all(part in page for part in ("What was asked", "Before and after", "The tuned design"))
     again = run("simulate", tmp_path / "tuned.toml", "-o", tmp_path / "run")
     assert again.exit_code == 0 and "its design" in again.output
 
