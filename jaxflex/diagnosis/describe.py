@@ -39,10 +39,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
     forces_after = search.latent(outcome.final.fit.vector)
     before = judge(problem, prepared.held_out, outcome.nominal)
     after = judge(problem, prepared.held_out, outcome.final)
-    levels = [
-        float(np.mean([(found[c] / s) ** 2 for c, s in _noise(problem).items()]))
-        for found, _ in (before, after)
-    ]
+    levels = [level(problem, found) for found, _ in (before, after)]
     gone = (levels[0] - levels[1]) / (levels[0] - 1) if levels[0] > VISIBLE else 0.0
     final = everything(prepared, search, outcome)
     estimates = _estimates(search, final)
@@ -104,6 +101,11 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
         predictions.append((run, reading))
     rms = np.sqrt(np.mean(squares, 0))
     return dict(zip(problem.setting.channels, map(float, rms), strict=True)), predictions
+
+
+def level(problem: Problem, errors: dict[str, float]) -> float:
+    """Misfit a reading of what `judge` found, in units of the noise: 1 is the noise floor."""
+    return float(np.mean([(errors[c] / s) ** 2 for c, s in _noise(problem).items()]))
 
 
 def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothesis:

@@ -9,10 +9,10 @@ import numpy as np
 from ..effects import EFFECTS, SensorGain
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
-from .describe import describe
+from .describe import describe, judge, level
 from .hypothesis import CLOSE, HORIZONS, PARTS, Hypothesis, Outcome, Ranked, Search, Starts, without
 from .loose_joint import loose_joints
-from .prepare import make_problem
+from .prepare import Prepared, make_problem
 from .result import Diagnosis
 
 MOST_EFFECTS = 5
@@ -53,10 +53,17 @@ def diagnose(
         say("what is left may lie between a motor and its link")
         for loose, other, start in loose_joints(file, recordings, say):
             found = find(other, start)
-            if found.final.strength(outcome.final) > STRONG:
+            if found.final.strength(outcome.final) > STRONG and _foretells(loose, found) < _foretells(
+                prepared, outcome
+            ):
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
     return describe(file, prepared, search, outcome, began)
+
+
+def _foretells(prepared: Prepared, outcome: Outcome) -> float:
+    """Misfit a reading over runs that nothing was fitted to, in units of the noise."""
+    return level(prepared.problem, judge(prepared.problem, prepared.held_out, outcome.final)[0])
 
 
 def departure(search: Search, hypothesis: Hypothesis) -> float:

@@ -113,7 +113,8 @@ def rest_before_motion(recording: Recording, inputs: Sequence[str]) -> int:
         if away.max() > 0:
             # second differences of white noise have six times its variance
             noise = float(np.median(np.abs(np.diff(values[:REST], 2)))) / 0.6745 / math.sqrt(6)
-            moved = away > max(_AT_REST * away.max(), 5 * noise)
+            # an input that chatters from the first sample on is not noise about rest
+            moved = away > max(_AT_REST * away.max(), min(5 * noise, away.max() / 2))
             moves.append(int(np.argmax(moved)) if moved.any() else len(values))
     return min(moves, default=0)
 
