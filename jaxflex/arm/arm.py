@@ -1,5 +1,7 @@
 """An arm: links, joints and payload in series, and the same arm with its constants computed."""
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -65,6 +67,11 @@ class Arm(eqx.Module):
                         f"drive = {self.drive!r} needs a motor at every joint; joint {number} has "
                         "none: give it one or set the drive to 'torque'."
                     )
+        if len(self.joints) > 1 and any(link.motion == "small" for link in self.links):
+            raise ValueError(
+                f"motion = 'small' makes the arm of one joint linear; this one has {len(self.joints)} "
+                "joints, whose turning is not: leave it out."
+            )
         for effect in self.effects:
             self._check_place(effect)
 
@@ -85,6 +92,18 @@ class Arm(eqx.Module):
         kept = self.payload.inertia if inertia is None else scalar(inertia)
         payload = Payload(mass=scalar(mass), inertia=kept)
         return eqx.tree_at(lambda arm: arm.payload, self, payload)
+
+    def linear(self) -> "Arm":
+        """The same arm of one joint in small motion and without a voltage limit, for `Exact()`.
+
+        Effects and gravity stay, so that what they add is linear or not as it is.
+
+        **Raises** `ValueError` for more joints.
+        """
+        links = tuple(dataclasses.replace(link, motion="small") for link in self.links)
+        motors = [joint.motor and dataclasses.replace(joint.motor, voltage_limit=None) for joint in self.joints]
+        joints = tuple(dataclasses.replace(j, motor=m) for j, m in zip(self.joints, motors, strict=True))
+        return dataclasses.replace(self, links=links, joints=joints)
 
     def distal(self, link: int) -> Distal:
         """What hangs on link `link` with the arm stretched (Ahmad et al. (24)-(25), corrected).

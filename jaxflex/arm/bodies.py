@@ -19,7 +19,7 @@ class Body(NamedTuple):
 
     Those of `LinkModel` under shorter names; `spread` is the part of `modal_inertia` that
     comes of masses, without the payload's own inertia, and is what deflections add to the
-    inertia about the root; `drawn`, `spun` are mean and moment of the shortening, or None.
+    inertia about the root (None in small motion); `drawn`, `spun` are mean and moment of the shortening, or None.
     """
 
     mass: Scalar
@@ -27,7 +27,7 @@ class Body(NamedTuple):
     second_moment: Scalar
     deflection: tuple[Scalar, ...]
     rotation: tuple[Scalar, ...]
-    spread: Rows
+    spread: Rows | None
     modal_inertia: Rows
     drawn: Rows | None
     spun: Rows | None
@@ -56,6 +56,9 @@ def bodies(model: AssembledArm) -> list[Body]:
             found[-1] = _beyond_play(found[-1], (1 - joint.motor_share) * joint.hub_inertia)
     if not payload_moves(model):
         found[-1] = _with_payload(found[-1], model.links[-1], model.arm.payload)
+    for i, link in enumerate(model.arm.links):
+        if link.motion == "small":
+            found[i] = found[i]._replace(spread=None)
     return found
 
 
@@ -76,6 +79,7 @@ def _beyond_play(body: Body, inertia: Scalar) -> Body:
 def _with_payload(body: Body, link: LinkModel, payload: Payload) -> Body:
     m, inertia, x = payload.mass, payload.inertia, link.length
     lift, slope = link.tip_deflection, link.tip_slope
+    assert body.spread is not None
     spread = _plus(body.spread, m, _outer(lift))
     return Body(
         body.mass + m,

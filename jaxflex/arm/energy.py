@@ -29,12 +29,13 @@ def kinetic_energy(model: AssembledArm, q: tuple, qd: tuple) -> Scalar:
         u, v, omega = frames[i]
         eta, eta_rate = etas[i], eta_rates[i]
         bent = dot(body.deflection, eta)
+        spread = 0.0 if body.spread is None else symmetric_form(body.spread, eta)
         bending = dot(body.deflection, eta_rate)
         spin = dot(body.rotation, eta_rate)
         twice = (
             twice
             + body.mass * (u * u + v * v)
-            + omega * omega * (body.second_moment + symmetric_form(body.spread, eta))
+            + omega * omega * (body.second_moment + spread)
             + symmetric_form(body.modal_inertia, eta_rate)
             + 2 * (omega * (v * body.first_moment - u * bent + spin) + v * bending)
         )

@@ -20,6 +20,9 @@ def damping_ratios(value: "ScalarLike | str | tuple[ScalarLike, ...]") -> tuple[
     return tuple(scalar(v) for v in value) if isinstance(value, tuple) else (scalar(value),)
 
 
+MOTIONS = ("finite", "small")
+
+
 class Link(eqx.Module):
     """A slender uniform link that bends in the plane of motion (Ahmad et al., assumptions I-V).
 
@@ -38,6 +41,8 @@ class Link(eqx.Module):
     - `root_compliance` [rad/(N m)] of the clamp that holds the link to its hub
     - `shortening`: share of the shortening by bending that is counted, 1 for all of it
       (centrifugal stiffening); None to leave it out
+    - `motion`: `"finite"`, or `"small"` to leave out what deflections add to the inertia about
+      the root, the one term that makes a single link non-linear (for an arm of one joint)
     """
 
     length: Scalar = eqx.field(converter=scalar)
@@ -53,12 +58,15 @@ class Link(eqx.Module):
     root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
     root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
     shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    motion: str = eqx.field(static=True, default="finite")
 
     __repr__ = brief
 
     def __check_init__(self):
         if self.modes < 0:
             raise ValueError(f"a link needs modes >= 0, found {self.modes}.")
+        if self.motion not in MOTIONS:
+            raise ValueError(f"motion = {self.motion!r} is unknown; allowed are {', '.join(MOTIONS)}.")
         if self.model not in ("assumed_modes", "lumped"):
             raise ValueError(f"model = {self.model!r} is unknown; allowed are assumed_modes, lumped.")
         if self.mode_shapes not in MODE_SHAPES:

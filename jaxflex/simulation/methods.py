@@ -22,6 +22,10 @@ INSTANT_SLACK = 1e-6  # share of a period within which two instants count as one
 
 
 class AbstractMethod(eqx.Module):
+    """How a simulation gets from its start to its end."""
+
+
+class AbstractSteps(AbstractMethod):
     """A solver and how it chooses its steps."""
 
     solver: eqx.AbstractVar[diffrax.AbstractSolver]
@@ -44,7 +48,7 @@ class AbstractMethod(eqx.Module):
         """Size of the first step [s], or None to let the solver choose."""
 
 
-class Adaptive(AbstractMethod):
+class Adaptive(AbstractSteps):
     """Steps chosen for an error of `rtol` relative and `atol` absolute in every state.
 
     The default solver, `diffrax.Tsit5`, suits arms whose fastest mode matters; give
@@ -88,7 +92,7 @@ class Adaptive(AbstractMethod):
         return None
 
 
-class Fixed(AbstractMethod):
+class Fixed(AbstractSteps):
     """Steps of at most `dt` [s] that land on every jump and sample instant.
 
     With the classical Runge-Kutta method, the default, and continuous control, steps

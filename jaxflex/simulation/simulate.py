@@ -17,11 +17,12 @@ from ..effects import AbstractSensorEffect
 from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
+from .exact import Exact, exact, require_linear, suits
 from .march import march
 from .methods import AbstractMethod, Adaptive, Fixed, SampleAndHold, sample
 from .plant import Plant, State, derivative
 from .stiffness import fastest_rate
-from .trajectory import DIVERGED, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
+from .trajectory import DIVERGED, INPUT_UNFIT, OK, STEP_TOO_SMALL, STEPS_EXHAUSTED, Trajectory
 
 
 class InitialState(eqx.Module):
@@ -86,7 +87,10 @@ def simulate(
     if disturbance is not None:
         _check_joints(plant, disturbance, "disturbance")
     start = initial_state(plant, initial or InitialState())
-    method = Adaptive() if method is None else method
+    if method is None:
+        method = Exact() if suits(plant, start) else Adaptive()
+    elif isinstance(method, Exact):
+        require_linear(plant, start)
     wanted = _wanted(plant, channels)
     inputs = (plant, start, times, method, wanted, max_steps, adjoint)
     if any(isinstance(leaf, Tracer) for leaf in jtu.tree_leaves(inputs)):
@@ -173,6 +177,15 @@ def _march(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
     return states, outcome, steps, jnp.zeros_like(steps)
 
 
+def _exact(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
+    """The same of a linear loop, without steps."""
+    plant, start, times, _ = inputs
+    backwards = not isinstance(adjoint, diffrax.ForwardMode)
+    states, pieces, fits = exact(plant, start, times, _jumps(plant), backwards)
+    outcome = jnp.select([~fits, pieces > max_steps], [INPUT_UNFIT, STEPS_EXHAUSTED], OK)
+    return states, outcome, pieces, jnp.zeros_like(pieces)
+
+
 def _solve(inputs, adjoint: diffrax.AbstractAdjoint, max_steps: int):
     """The same by a solver of diffrax."""
     plant, start, times, method = inputs
@@ -221,7 +234,8 @@ def _integrate(
 ) -> Trajectory:
     inputs = (plant, start, times, method)
     marching = isinstance(method, Fixed) and method.marches(plant.sample_time is not None)
-    solve = partial(_march if marching else _solve, max_steps=max_steps)
+    way = _exact if isinstance(method, Exact) else _march if marching else _solve
+    solve = partial(way, max_steps=max_steps)
     if adjoint is None:
         differentiable = both_modes(
             lambda x: solve(x, diffrax.ForwardMode()),

@@ -13,7 +13,7 @@ from ..sensors import unit
 from .frames import from_dataset, from_frame, to_dataset, to_frame
 from .plant import State
 
-OK, STEPS_EXHAUSTED, STEP_TOO_SMALL, DIVERGED = 0, 1, 2, 3
+OK, STEPS_EXHAUSTED, STEP_TOO_SMALL, DIVERGED, INPUT_UNFIT = 0, 1, 2, 3, 4
 REASONS = {
     STEPS_EXHAUSTED: "the solver ran out of steps before the last time; raise max_steps, loosen rtol, "
     "or use a stiff solver (Adaptive(solver=diffrax.Kvaerno5()))",
@@ -21,6 +21,8 @@ REASONS = {
     "loop is too stiff for it; check the gains and the parameters, or use a stiff solver",
     DIVERGED: "the arm diverged: a link bent by more than its own length, or a state is no longer "
     "finite; the loop is unstable (check the signs and sizes of the gains) or the step is too large",
+    INPUT_UNFIT: "the reference or a disturbance is no polynomial of time (of degree 5) between the times "
+    "wanted and its jumps, which Exact() needs; ask for more times, or use Adaptive()",
 }
 
 
