@@ -101,7 +101,9 @@ class Arm(eqx.Module):
         **Raises** `ValueError` for more joints.
         """
         links = tuple(dataclasses.replace(link, motion="small") for link in self.links)
-        motors = [joint.motor and dataclasses.replace(joint.motor, voltage_limit=None) for joint in self.joints]
+        motors = [
+            joint.motor and dataclasses.replace(joint.motor, voltage_limit=None) for joint in self.joints
+        ]
         joints = tuple(dataclasses.replace(j, motor=m) for j, m in zip(self.joints, motors, strict=True))
         return dataclasses.replace(self, links=links, joints=joints)
 

@@ -30,7 +30,7 @@ class Exact(AbstractMethod):
 
     A loop is linear if the arm has one joint, its link is rigid or has `motion="small"`, there is
     no voltage limit, dry friction, gravity or play, and the controller is linear and continuous
-    (PD, PID without limit, LQR, LQG, filters); `Arm.linear()` makes such an arm. The input must
+    (PD, strain-rate feedback, filters, LQG; not PID, whose integral is limited); `Arm.linear()` makes such an arm. The input must
     be a polynomial of at most degree 5 in time between its jumps: all moves and steps are, and
     either through any shaper. `simulate` takes this method by itself where both are certain by
     structure. Any other input is a failure with its reason.
@@ -154,7 +154,9 @@ def _beside_jumps(
 ) -> tuple[Int[Array, " jumps"], Float[Array, "jumps n"]]:
     """Intervals in which the input jumps, and what each jump's pieces add to the state at their end."""
     count = knots.shape[0]
-    interval = jnp.clip(jnp.searchsorted(grid, jax.lax.stop_gradient(knots), side="right") - 1, 0, grid.shape[0] - 2)
+    interval = jnp.clip(
+        jnp.searchsorted(grid, jax.lax.stop_gradient(knots), side="right") - 1, 0, grid.shape[0] - 2
+    )
     lower, upper = grid[interval], grid[interval + 1]
     earlier = jnp.concatenate([grid[:1], knots[:-1]])
     # from the jump before, or the beginning of the interval, to the jump
@@ -168,7 +170,7 @@ def _beside_jumps(
     nothing = jnp.zeros((2 * count, matrix.shape[0]), matrix.dtype)
     pushed = moved(matrix, nothing, slopes, end - begin, longest, backwards)
     left = jnp.concatenate([upper, upper]) - end
-    carried = moved(matrix, pushed, jnp.zeros_like(slopes[:, :1]), left, longest, backwards)
+    carried = moved(matrix, pushed, slopes[:, :0], left, longest, backwards)
     return interval, carried[:count] + carried[count:]
 
 

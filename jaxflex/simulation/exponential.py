@@ -17,7 +17,7 @@ from ..scalars import Scalar
 
 DEGREE = 5  # of the polynomials: that of the angle in a quintic move
 TERMS = 15  # of the series of the last phi at a norm of one: the next is below rounding
-REACH, REACH_TERMS = 4.0, 36  # norm of what a state is moved by in one go, and the series for it
+REACH, REACH_TERMS = 8.0, 48  # norm of what a state is moved by in one go, and the series for it
 BALANCING = 20
 CHECKPOINTS = 16
 
@@ -68,16 +68,26 @@ def moved(
     goes = jnp.ceil(jnp.maximum(size(matrix) * longest / REACH, 1.0)).astype(int)
     h = (lengths / goes)[:, None]
 
-    def go(_, start):
-        def term(m, carry):
-            total, (x, input) = carry
-            share = h / m
-            ahead = jnp.concatenate([input[:, 1:], jnp.zeros_like(input[:, :1])], axis=1)
-            new = share * (x @ matrix.T + input[:, 0]), share[:, None] * ahead
-            return (total[0] + new[0], total[1] + new[1]), new
+    orders = slopes.shape[1]
 
-        total, _ = jax.lax.fori_loop(1, REACH_TERMS, term, (start, start))
-        return total
+    def go(_, start):
+        x, slopes = start
+        total, term = x, x
+        for m in range(orders):
+            pushed = h ** (m + 1) / math.factorial(m + 1) * slopes[:, m]
+            term = h / (m + 1) * (term @ matrix.T) + pushed
+            total = total + term
+
+        def more(m, carry):
+            total, term = carry
+            term = h / m * (term @ matrix.T)
+            return total + term, term
+
+        total, _ = jax.lax.fori_loop(orders + 1, REACH_TERMS, more, (total, term))
+        further = [
+            sum(h**j / math.factorial(j) * slopes[:, m + j] for j in range(orders - m)) for m in range(orders)
+        ]
+        return total, jnp.stack(further, axis=1) if orders else slopes
 
     return loop(goes, go, (state, slopes), backwards)[0]
 

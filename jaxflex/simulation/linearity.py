@@ -20,8 +20,7 @@ from .plant import Plant, State, derivative
 
 ANY = float("inf")  # a function of time that is no polynomial
 SUMS = frozenset(
-    "add add_any sub neg copy copy_p convert_element_type broadcast_in_dim reshape squeeze concatenate "
-    "transpose slice reduce_sum cumsum pad expand_dims rev".split()
+    ["add", "add_any", "sub", "neg", "copy", "copy_p", "convert_element_type", "broadcast_in_dim", "reshape", "squeeze", "concatenate", "transpose", "slice", "reduce_sum", "cumsum", "pad", "expand_dims", "rev", "stack", "unstack", "split"]
 )
 INNER = ("jaxpr", "call_jaxpr")
 
@@ -92,7 +91,7 @@ def _through(program: core.Jaxpr, given: list[Degree]) -> list[Degree]:
 def _results(equation: core.JaxprEqn, operands: list[Degree]) -> list[Degree]:
     name, params, count = equation.primitive.name, equation.params, len(equation.outvars)
     if name in SUMS:
-        return [_highest(operands)]
+        return [_highest(operands)] * count
     if name in RULES:
         return [RULES[name](operands, params)]
     if name == "custom_linear_solve":

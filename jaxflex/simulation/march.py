@@ -13,12 +13,13 @@ import jax.tree_util as jtu
 from jaxtyping import Array, Float, Int
 
 from ..scalars import Scalar
-from .plant import Plant, State, derivative
+from .plant import Plant, State, derivative, within
 from .rosenbrock import LinearlyImplicit, rosenbrock_step
 from .runge_kutta import RungeKutta4
 
 CHECKPOINTS = 32  # states kept between two instants for going backwards
 SLACK = 1e-9  # share of a step by which an interval may exceed a whole number of them
+ROUNDING = 8  # units in the last place by which the time of a jump may be off
 
 
 def march(
@@ -37,21 +38,23 @@ def march(
     taken. `backwards`: keep what reverse mode needs; without, forward mode alone works.
     """
     step = rosenbrock_step if isinstance(solver, LinearlyImplicit) else classical_step
-    inside = jnp.clip(jumps, times[0], times[-1])
+    rounding = ROUNDING * jnp.finfo(times.dtype).eps * jnp.abs(jax.lax.stop_gradient(times)).max()
+    inside = _on_times(jnp.clip(jumps, times[0], times[-1]), times, rounding)
     instants = jnp.sort(jnp.concatenate([times, inside]))
     lengths = jnp.diff(instants)
-    counts = jnp.ceil(jax.lax.stop_gradient(lengths / dt) - SLACK).astype(int)
+    # a jump at one of the times has an interval of no length, whose step has a derivative nevertheless
+    counts = jnp.maximum(jnp.ceil(jax.lax.stop_gradient(lengths / dt) - SLACK), 1).astype(int)
     total = jnp.sum(counts)
     counts = jnp.where(total <= max_steps, counts, 0)
 
     def interval(state, given):
         begin, end, count = given
         h = (end - begin) / jnp.maximum(count, 1)
-        # what happens at the end of an interval, such as a jump, is not yet seen
-        before = jnp.nextafter(jax.lax.stop_gradient(end), jax.lax.stop_gradient(begin))
+        # of a jump at its beginning an interval sees what is after, of one at its end what is before
+        seen = jax.lax.stop_gradient((begin + rounding, end - rounding))
 
         def advance(i, state):
-            return step(plant, begin + i * h, h, before, state)
+            return step(plant, begin + i * h, h, seen, state)
 
         loop = _loop_backwards if backwards else _loop
         state = loop(count, advance, state)
@@ -63,8 +66,17 @@ def march(
     return saved, total
 
 
-def classical_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: State) -> State:
-    """One step of `h` [s] from `t` (Kutta 1901), nothing seen of what happens after `before`."""
+def _on_times(jumps: Float[Array, " jumps"], times: Float[Array, " times"], rounding: Scalar) -> Array:
+    """Jumps that miss one of `times` by no more than `rounding` moved onto it, their derivatives kept."""
+    given, known = jax.lax.stop_gradient((jumps, times))
+    after = jnp.clip(jnp.searchsorted(known, given), 1, times.shape[0] - 1)
+    lower, upper = known[after - 1], known[after]
+    nearest = jnp.where(given - lower < upper - given, lower, upper)
+    return jumps + jnp.where(jnp.abs(given - nearest) <= rounding, nearest - given, 0.0)
+
+
+def classical_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: State) -> State:
+    """One step of `h` [s] from `t` (Kutta 1901), of whose input only what is within `seen` is read."""
 
     def moved(a, slope, by):
         return jtu.tree_map(lambda x, s: x + by * s, a, slope)
@@ -73,10 +85,7 @@ def classical_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: St
         # a scan, so that one program serves the four stages
         slope, total = carry
         ahead, share = weights
-        now = t + ahead * h
-        # its value just before the end, its derivative as it is
-        seen = now - jax.lax.stop_gradient(jnp.maximum(now - before, 0.0))
-        slope = derivative(seen, moved(state, slope, ahead * h), plant)
+        slope = derivative(within(seen, t + ahead * h), moved(state, slope, ahead * h), plant)
         return (slope, moved(total, slope, share)), None
 
     zero = jtu.tree_map(jnp.zeros_like, state)

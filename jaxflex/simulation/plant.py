@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
@@ -136,3 +137,8 @@ class Plant(eqx.Module):
 def derivative(t: Scalar, state: State, plant: Plant) -> State:
     """`plant.derivative(t, state)` as the solver calls it."""
     return plant.derivative(t, state)
+
+
+def within(seen: tuple, t: Scalar) -> Scalar:
+    """`t` within the two instants `seen`, the second if they are in the wrong order; slope 1 in `t`."""
+    return t + jax.lax.stop_gradient(jnp.clip(t, *seen) - t)

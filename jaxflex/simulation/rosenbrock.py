@@ -24,7 +24,7 @@ from ..drive import has_current_state
 from ..dynamics.lagrange import inertia
 from ..dynamics.ldl import factorised, substitute
 from ..scalars import Scalar, dot
-from .plant import Plant, State, derivative
+from .plant import Plant, State, derivative, within
 
 _GAMMA = 0.435866521508459
 _ALPHA = np.array(
@@ -59,8 +59,8 @@ class LinearlyImplicit(eqx.Module):
     """
 
 
-def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: State) -> State:
-    """One step of `h` [s] from `t`, nothing seen of what happens after `before`."""
+def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: State) -> State:
+    """One step of `h` [s] from `t`, of whose input only what is within `seen` is read."""
     model = plant.model
     mass = inertia(model, state.q)
     held_by, slowed_by = _joint_slopes(plant, t, state)
@@ -107,8 +107,7 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, before: Scalar, state: S
         # a scan, so that one program serves the four stages
         number, ahead, a, c = given
         now = t + ahead * h
-        seen = now - jax.lax.stop_gradient(jnp.maximum(now - before, 0.0))
-        slope = derivative(seen, combined(state, tuple(a), stages), plant)
+        slope = derivative(within(seen, now), combined(state, tuple(a), stages), plant)
         found = solved(combined(slope, tuple(c / h), stages))
         return tuple(
             jtu.tree_map(partial(jnp.where, number == i), found, old) for i, old in enumerate(stages)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxflex as jf
-from controllers import PD, BangBang, Move, OpenLoop, Step
+from controllers import PD, BangBang, Move, OpenLoop, Shaped, Shaper, Step
 
 ARM = jf.ahmad_arm(0.05, modes=1, drive="torque")
 TIMES = jnp.linspace(0.0, 0.6, 13)
@@ -33,6 +33,24 @@ def test_the_time_of_a_jump_has_a_derivative_in_both_modes():
     width = jnp.asarray(0.2371)
     np.testing.assert_allclose(jax.grad(lambda w: last(w, method))(width), slope, rtol=1e-6)
     np.testing.assert_allclose(jax.jacfwd(lambda w: last(w, method))(width), slope, rtol=1e-6)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-16, -1e-16])
+def test_a_jump_at_one_of_the_times_has_its_derivative_too(off):
+    # whichever way its time and the echo of it, 0.1 and 0.1437, are rounded
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.01, viscous_friction=0.02),))
+    times, shaper = jnp.linspace(0.0, 0.3, 31), Shaper(jnp.array([0.6, 0.4]), jnp.array([0.0, 0.0437]))
+
+    def angle(begin, method):
+        step = Shaped(Step((0.1,), (0.3,), begin), shaper)
+        return jf.simulate(arm, PD((2.0,), (0.1,)), step, times, method=method)["angle_1"][-1]
+
+    begin = 0.1 + off
+    coarse, fine = angle(begin, jf.Fixed(2e-3)), angle(begin, jf.Exact())
+    np.testing.assert_allclose(coarse, fine, atol=1e-9)
+    slope = (angle(begin + 1e-5, jf.Exact()) - angle(begin - 1e-5, jf.Exact())) / 2e-5
+    ahead = jax.jvp(lambda b: angle(b, jf.Fixed(2e-3)), (begin,), (1.0,))[1]
+    np.testing.assert_allclose(ahead, slope, rtol=1e-6)
 
 
 def test_step_from_the_fastest_rate_is_stable_and_accurate():
