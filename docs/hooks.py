@@ -44,7 +44,8 @@ def api(package: str) -> str:
     """Every public name of a package, under the module that defines it."""
     module = importlib.import_module(package)
     groups: dict[str, list[str]] = {}
-    for name, thing in vars(module).items():
+    for name in dict.fromkeys([*vars(module), *dir(module)]):
+        thing = getattr(module, name)
         home = getattr(thing, "__module__", None) or ""
         if name.startswith("_") or inspect.ismodule(thing) or not home.startswith(package + "."):
             continue

@@ -3,6 +3,9 @@
 Pure functions of pytrees, in SI units: everything works under `jit`, `vmap`, `grad` and `jvp`.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 # Analysis
 from .analysis.export import to_control as to_control
 from .analysis.frequencies import clamped_frequencies as clamped_frequencies
@@ -45,10 +48,6 @@ from .control import AbstractReference as AbstractReference
 from .control import Measurement as Measurement
 from .control import Setpoint as Setpoint
 
-# Diagnosis
-from .diagnosis import Diagnosis as Diagnosis
-from .diagnosis import diagnose as diagnose
-
 # Dynamics by autodiff of T - U
 from .dynamics.lagrange import coriolis_matrix as coriolis_matrix
 from .dynamics.lagrange import gravity_vector as gravity_vector
@@ -80,14 +79,7 @@ from .files.recording import RecordingError as RecordingError
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 
-# Pictures
-from .plotting_animation import animate as animate
-from .plotting_run import plot as plot
-
-# Scalars, sensors, modes from recordings
-from .ringing import MeasuredMode as MeasuredMode
-from .ringing import MeasuredModes as MeasuredModes
-from .ringing import measure_modes as measure_modes
+# Scalars and sensors
 from .scalars import Scalar as Scalar
 from .scalars import ScalarLike as ScalarLike
 from .scalars import optional_scalar as optional_scalar
@@ -112,3 +104,35 @@ from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import SimulationError as SimulationError
 from .simulation.trajectory import Trajectory as Trajectory
 from .sweep import sweep as sweep
+
+# Diagnosis, pictures, modes from recordings: imported when first asked for, since what they need
+# of SciPy and matplotlib takes longer to import than all the rest
+if TYPE_CHECKING:
+    from .diagnosis import Diagnosis as Diagnosis
+    from .diagnosis import diagnose as diagnose
+    from .plotting_animation import animate as animate
+    from .plotting_run import plot as plot
+    from .ringing import MeasuredMode as MeasuredMode
+    from .ringing import MeasuredModes as MeasuredModes
+    from .ringing import measure_modes as measure_modes
+
+_LATER = {
+    "Diagnosis": "diagnosis",
+    "diagnose": "diagnosis",
+    "animate": "plotting_animation",
+    "plot": "plotting_run",
+    "MeasuredMode": "ringing",
+    "MeasuredModes": "ringing",
+    "measure_modes": "ringing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATER})

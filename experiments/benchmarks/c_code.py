@@ -9,6 +9,7 @@ import ctypes
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -152,12 +153,28 @@ def _split(expressions: list[sp.Expr], q: list, qd: list):
     return replaced, once
 
 
-def source(e: Equations) -> str:
-    """The C program."""
-    n, printer = len(e.q), _Printer()
+class Operations(NamedTuple):
+    """What a right-hand side computes, statement by statement, pairs of a name and an expression.
+
+    `once` an arm, the constants `h[k]` last; `shared` for each state, then the lower triangle
+    `mass[i, j]` and the bias with its damping `bias[i]`; `angle` is what `ss` and `cc` are of.
+    """
+
+    once: list[tuple[sp.Symbol, sp.Expr]]
+    shared: list[tuple[sp.Symbol, sp.Expr]]
+    mass: dict[tuple[int, int], sp.Expr]
+    bias: list[sp.Expr]
+    angle: sp.Expr
+    constants: int
+
+
+def operations(e: Equations) -> Operations:
+    """The equations over `p[i]`, `q[i]` and `v[i]`, common subexpressions taken out."""
+    n = len(e.q)
     angle = next(iter(e.mass.atoms(sp.sin, sp.cos))).args[0]
     short = {sp.cos(angle): sp.Symbol("cc"), sp.sin(angle): sp.Symbol("ss")}
-    lower = [e.mass[i, j].subs(short) for i in range(n) for j in range(i + 1)]
+    below = [(i, j) for i in range(n) for j in range(i + 1)]
+    lower = [e.mass[i, j].subs(short) for i, j in below]
     right = [x.subs(short) + d * v for x, d, v in zip(e.bias, e.damping, e.qd, strict=True)]
     renamed = {s: sp.Symbol(f"p[{i}]") for i, s in enumerate(e.symbols)}
     renamed |= {s: sp.Symbol(f"q[{i}]") for i, s in enumerate(e.q)}
@@ -165,29 +182,32 @@ def source(e: Equations) -> str:
     named = [sp.Symbol(f"q[{i}]") for i in range(n)], [sp.Symbol(f"v[{i}]") for i in range(n)]
     polynomials, once = _split([x.xreplace(renamed) for x in (*lower, *right)], *named)
     shared, out = sp.cse(polynomials, optimizations="basic")
-    body = [f"    real {s} = {printer.doprint(x)};" for s, x in shared]
-    body.append("    real m[N][N], l[N][N], inv[N];")
-    entries = iter(out)
-    body += [
-        f"    m[{i}][{j}] = {printer.doprint(next(entries))} + 0 * y[0];"
-        for i in range(n)
-        for j in range(i + 1)
-    ]
-    body += [f"    f[{i}] -= {printer.doprint(next(entries))};" for i in range(n)]
     once_shared, once_out = sp.cse(list(once))
-    first = [f"    real {s} = {printer.doprint(x)};" for s, x in once_shared]
-    first += [
-        f"    {s} = {printer.doprint(x)} + 0 * p[0];" for s, x in zip(once.values(), once_out, strict=True)
+    first = [*once_shared, *zip(once.values(), once_out, strict=True)]
+    mass = dict(zip(below, out[: len(below)], strict=True))
+    return Operations(first, shared, mass, out[len(below) :], angle.xreplace(renamed), max(1, len(once)))
+
+
+def source(e: Equations) -> str:
+    """The C program."""
+    found, printed = operations(e), _Printer().doprint
+    first = [
+        f"    {s} = {printed(x)} + 0 * p[0];" if "[" in s.name else f"    real {s} = {printed(x)};"
+        for s, x in found.once
     ]
+    body = [f"    real {s} = {printed(x)};" for s, x in found.shared]
+    body.append("    real m[N][N], l[N][N], inv[N];")
+    body += [f"    m[{i}][{j}] = {printed(x)} + 0 * y[0];" for (i, j), x in found.mass.items()]
+    body += [f"    f[{i}] -= {printed(x)};" for i, x in enumerate(found.bias)]
     command = [
         f"    f[{i}] = {float(GAINS.stiffness[i])!r} * ({STOP[i]!r} * share - q[{i}])"
         f" + {float(GAINS.damping[i])!r} * ({STOP[i]!r} * rate - v[{i}]);"
         for i in range(len(STOP))
     ]
     return HEAD % {
-        "n": n, "parameters": len(e.symbols), "constants": max(1, len(once)),
+        "n": len(e.q), "parameters": len(e.symbols), "constants": found.constants,
         "once": "\n".join(first), "move": MOVE_TIME, "command": "\n".join(command),
-        "angle": printer.doprint(angle.xreplace(renamed)), "body": "\n".join(body),
+        "angle": printed(found.angle), "body": "\n".join(body),
     }  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from .stretches import Stretch
 
@@ -51,6 +50,8 @@ def poles_of(modes: np.ndarray) -> np.ndarray:
 
 def columns(stretch: Stretch, poles: np.ndarray) -> np.ndarray:
     """What every channel is made of: `(times, columns)`, the waves of a pole side by side."""
+    from scipy.signal import lfilter  # noqa: PLC0415 -- takes longer to import than all else here
+
     t = stretch.times
     parts = [np.ones_like(t), t / t[-1]]
     for pole in poles:

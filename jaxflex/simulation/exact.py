@@ -28,12 +28,13 @@ _INVERSE = np.linalg.inv(np.vander(_NODES, increasing=True))  # values at the no
 class Exact(AbstractMethod):
     """The exact solution of a linear loop: no steps, and no error of them.
 
-    A loop is linear if the arm has one joint, its link is rigid or has `motion="small"`, there is
-    no voltage limit, dry friction, gravity or play, and the controller is linear and continuous
-    (PD, strain-rate feedback, filters, LQG; not PID, whose integral is limited); `Arm.linear()` makes such an arm. The input must
-    be a polynomial of at most degree 5 in time between its jumps: all moves and steps are, and
-    either through any shaper. `simulate` takes this method by itself where both are certain by
-    structure. Any other input is a failure with its reason.
+    A loop is linear if the arm has one joint, its link is rigid or has `motion="small"`, there
+    is no voltage limit, dry friction, gravity or play, and the controller is linear and
+    continuous (PD, strain-rate feedback, filters, LQG; not PID, whose integral is limited).
+    `Arm.linear()` makes such an arm. The input must be a polynomial of at most degree 5 in time
+    between its jumps: all moves and steps are, and either through any shaper. `simulate` takes
+    this method by itself where both are certain by structure. Any other input is a failure with
+    its reason.
     """
 
 

@@ -19,9 +19,11 @@ from jax.extend import core
 from .plant import Plant, State, derivative
 
 ANY = float("inf")  # a function of time that is no polynomial
-SUMS = frozenset(
-    ["add", "add_any", "sub", "neg", "copy", "copy_p", "convert_element_type", "broadcast_in_dim", "reshape", "squeeze", "concatenate", "transpose", "slice", "reduce_sum", "cumsum", "pad", "expand_dims", "rev", "stack", "unstack", "split"]
-)
+SUMS = {
+    "add", "add_any", "sub", "neg", "copy", "copy_p", "convert_element_type", "broadcast_in_dim", "reshape",
+    "squeeze", "concatenate", "transpose", "slice", "reduce_sum", "cumsum", "pad", "expand_dims", "rev",
+    "stack", "unstack", "split",
+}  # fmt: skip
 INNER = ("jaxpr", "call_jaxpr")
 
 
@@ -80,16 +82,14 @@ def _through(program: core.Jaxpr, given: list[Degree]) -> list[Degree]:
 
     for equation in program.eqns:
         operands = [read(v) for v in equation.invars]
-        if _highest(operands) == CONSTANT:
-            found = [CONSTANT] * len(equation.outvars)
-        else:
-            found = _results(equation, operands)
-        known |= dict(zip(equation.outvars, found, strict=True))
+        known |= dict(zip(equation.outvars, _results(equation, operands), strict=True))
     return [read(v) for v in program.outvars]
 
 
 def _results(equation: core.JaxprEqn, operands: list[Degree]) -> list[Degree]:
     name, params, count = equation.primitive.name, equation.params, len(equation.outvars)
+    if _highest(operands) == CONSTANT:
+        return [CONSTANT] * count
     if name in SUMS:
         return [_highest(operands)] * count
     if name in RULES:

@@ -44,7 +44,8 @@ _COUPLING = np.array(
     ]
 )
 _WEIGHTS = np.array([0.2421238070609535, -1.2232505839045147, 1.545260255335102, _GAMMA])
-# in the unknowns u = Gamma k, which spare the products with J (Hairer and Wanner 1996, IV.7)
+# in the unknowns u = Gamma k / h, which spare the products with J (Hairer and Wanner 1996, IV.7)
+# and are finite where h is zero
 _A = _ALPHA @ np.linalg.inv(_COUPLING)
 _C = np.eye(4) / _GAMMA - np.linalg.inv(_COUPLING)
 _M = _WEIGHTS @ np.linalg.inv(_COUPLING)
@@ -67,9 +68,9 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
     stiffness = tuple(k + c for k, c in zip(model.stiffness(), held_by, strict=True))
     damping = tuple(d + c for d, c in zip(model.damping(), slowed_by, strict=True))
     g = h * _GAMMA
-    # M / g + D + g K
+    # M + g D + g^2 K
     shifted = [
-        [value / g + (damping[i] + g * stiffness[i] if i == j else 0.0) for j, value in enumerate(row)]
+        [value + (g * (damping[i] + g * stiffness[i]) if i == j else 0.0) for j, value in enumerate(row)]
         for i, row in enumerate(mass)
     ]
     # its inverse, once a step: rows times a vector are independent of one another, which XLA fuses
@@ -86,15 +87,17 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
     )
 
     def solved(r: State) -> State:
-        """`u` with `(1 / g - J) u = r`."""
-        # M r / g = (shifted - D - g K) r, so M itself is not needed
+        """`u` with `(1 / gamma - h J) u = r`."""
+        # M r = (shifted - g D - g^2 K) r, so M itself is not needed
         pull = tuple(
             (d + g * k) * v + k * x for d, k, x, v in zip(damping, stiffness, r.q, r.qd, strict=True)
         )
-        rates = tuple(g * (v - dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
-        moved = tuple(g * (x + v) for x, v in zip(r.q, rates, strict=True))
-        rest = jtu.tree_map(lambda x: g * x, r)
-        current = r.current and tuple(x / (1 / g + d) for x, d in zip(r.current, decays, strict=True))
+        rates = tuple(_GAMMA * (v - g * dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
+        moved = tuple(_GAMMA * (x + h * v) for x, v in zip(r.q, rates, strict=True))
+        rest = jtu.tree_map(lambda x: _GAMMA * x, r)
+        current = r.current and tuple(
+            x / (1 / _GAMMA + h * d) for x, d in zip(r.current, decays, strict=True)
+        )
         return rest._replace(q=moved, qd=rates, current=current)
 
     def combined(base: State, weights, stages: tuple[State, ...]) -> State:
@@ -107,8 +110,8 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
         # a scan, so that one program serves the four stages
         number, ahead, a, c = given
         now = t + ahead * h
-        slope = derivative(within(seen, now), combined(state, tuple(a), stages), plant)
-        found = solved(combined(slope, tuple(c / h), stages))
+        slope = derivative(within(seen, now), combined(state, tuple(a * h), stages), plant)
+        found = solved(combined(slope, tuple(c), stages))
         return tuple(
             jtu.tree_map(partial(jnp.where, number == i), found, old) for i, old in enumerate(stages)
         ), None
@@ -116,7 +119,7 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
     none = (jtu.tree_map(jnp.zeros_like, state),) * 4
     given = (jnp.arange(4), jnp.asarray(_TIMES), jnp.asarray(_A), jnp.asarray(_C))
     stages, _ = jax.lax.scan(stage, none, given)
-    return combined(state, tuple(_M), stages)
+    return combined(state, tuple(_M * h), stages)
 
 
 def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
