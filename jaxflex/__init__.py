@@ -104,6 +104,8 @@ from .simulation.simulate import simulate as simulate
 from .simulation.trajectory import SimulationError as SimulationError
 from .simulation.trajectory import Trajectory as Trajectory
 from .sweep import sweep as sweep
+from .timing import Timing as Timing
+from .timing import timed as timed
 
 # Diagnosis, pictures, modes from recordings: imported when first asked for, since what they need
 # of SciPy and matplotlib takes longer to import than all the rest

@@ -16,9 +16,11 @@ import jaxflex as jf
 from jaxflex.dynamics.lagrange import accelerations
 
 from .c_code import Compiled
+from .choice import measure as choice
 from .equations import equations
 from .gradients import measure
-from .pictures import plot_gradients, plot_scaling, plot_work_precision
+from .peers import peer_rows
+from .pictures import plot_choice, plot_gradients, plot_scaling, plot_sizes, plot_work_precision
 from .problem import sweep
 from .timing import best_of, compiled, machine
 from .work_precision import c_rows, fastest, library_rows, reference, run_library
@@ -27,13 +29,9 @@ IMPLICIT = jf.LinearlyImplicit()
 BEST = jf.Fixed(0.01, IMPLICIT)
 
 
-def rhs(reduced: bool) -> dict[str, Any]:
-    """Microseconds of one right-hand side an arm, each in a loop that moves the state on."""
-    count, repeats = 64, 500 if reduced else 5000
-    arms = sweep(count)
-    models = arms.models()
-    zero = jnp.zeros(count)
-    start = (zero,) * models_size(models)
+def repeated(models: jf.AssembledArm, count: int, repeats: int) -> tuple[Callable[[], Any], float]:
+    """A loop over right-hand sides of `count` arms that moves the state on, and seconds to compile it."""
+    start = (jnp.zeros(count),) * models_size(models)
 
     def library(models, q):
         def one(model, q):
@@ -47,7 +45,14 @@ def rhs(reduced: bool) -> dict[str, Any]:
 
         return jax.vmap(one)(models, q)
 
-    call, seconds = compiled(library, models, start)
+    return compiled(library, models, start)
+
+
+def rhs(reduced: bool) -> dict[str, Any]:
+    """Microseconds of one right-hand side an arm."""
+    count, repeats = 64, 500 if reduced else 5000
+    models = sweep(count).models()
+    call, seconds = repeated(models, count, repeats)
     e = equations(models)
     found = {f"jaxflex, {count} arms": best_of(call), "jaxflex, seconds to compile": seconds}
     with tempfile.TemporaryDirectory() as folder:
@@ -74,12 +79,16 @@ def work_precision(reduced: bool) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         rows = c_rows(arms, e, exact, (1e-3,) if reduced else (1.05e-3, 1e-3, 5e-4), Path(folder))
     rows += library_rows(arms, exact, methods)
-    best = {name: fastest(rows, name) for name in ("jaxflex", "scalar C", "vector C")}
+    others, missing = peer_rows(arms, e, exact, reduced)
+    rows += others
+    best = {name: fastest(rows, name) for name in dict.fromkeys(r["program"] for r in rows)}
+    ours = best.pop("jaxflex")
     return {
         "arms": len(arms.payloads),
         "rows": rows,
-        "seconds over those of vector C": best["jaxflex"]["seconds"] / best["vector C"]["seconds"],
-        "seconds over those of scalar C": best["jaxflex"]["seconds"] / best["scalar C"]["seconds"],
+        "not measured": missing,
+        "fastest that are exact enough": [ours, *best.values()],
+        "seconds over those of jaxflex": {name: r["seconds"] / ours["seconds"] for name, r in best.items()},
     }
 
 
@@ -92,6 +101,34 @@ def scaling(reduced: bool) -> dict[str, Any]:
         run()
         found[count] = best_of(run, 3 if count < 10_000 else 1) / count * 1e6
     return {"microseconds an arm": found}
+
+
+def sizes(reduced: bool) -> dict[str, Any]:
+    """A right-hand side of 64 arms, and its compilation, against the number of links and of modes."""
+    count, repeats = 64, 50 if reduced else 500
+    some = range(1, 3 if reduced else 7)
+    cases = [(links, 2) for links in some] + [(2, modes) for modes in some if modes != 2]
+    rows = []
+    for links, modes in cases:
+
+        def arm(payload, links=links, modes=modes):
+            one = jf.ahmad_arm(payload, modes=modes, drive="torque", mode_shapes="clamped_tip_mass")
+            joints = (one.joints[0],) + (one.joints[1],) * (links - 1)
+            return jf.Arm((one.links[0],) * links, joints, one.payload)
+
+        models = jax.jit(jax.vmap(lambda m, arm=arm: arm(m).assemble()))(jnp.linspace(0.0, 0.1, count))
+        call, seconds = repeated(models, count, repeats)
+        rows.append(
+            {
+                "links": links,
+                "modes": modes,
+                "coordinates": links * (1 + modes),
+                "microseconds": best_of(call, 3) / repeats / count * 1e6,
+                "seconds to compile": seconds,
+            }
+        )
+        print(rows[-1], flush=True)
+    return {"rows": rows}
 
 
 START = """
@@ -138,6 +175,8 @@ QUESTIONS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "rhs": rhs,
     "work_precision": work_precision,
     "scaling": scaling,
+    "sizes": sizes,
+    "choice": choice,
     "gradients": gradients,
     "first_simulation": first_simulation,
     "tune": tune,
@@ -151,7 +190,8 @@ def run(folder: Path, reduced: bool, questions: tuple[str, ...] = tuple(QUESTION
         figures[name] = QUESTIONS[name](reduced)
         print(name, figures[name], flush=True)
     for name, plot in (
-        ("work_precision", plot_work_precision), ("scaling", plot_scaling), ("gradients", plot_gradients)
+        ("work_precision", plot_work_precision), ("scaling", plot_scaling), ("sizes", plot_sizes),
+        ("choice", plot_choice), ("gradients", plot_gradients),
     ):  # fmt: skip
         if name in figures:
             plot(figures[name]).savefig(folder / f"{name}.png", dpi=130)

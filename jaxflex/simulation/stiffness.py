@@ -14,17 +14,19 @@ def fastest_rate(t: Scalar, state: State, plant: Plant) -> Scalar:
     """Estimate of the largest `|lambda|` [rad/s] of the loop linearised at `state`; zero if it has none.
 
     By power iteration: the geometric mean growth over many steps, which forgives that
-    positions and rates are of different size and that complex poles make it swing.
+    positions and rates are of different size and that complex poles make it swing. Slopes are
+    differences, good enough for an estimate and compiled in half the time of derivatives.
     """
     flat, unflatten = ravel_pytree(state)
 
     def slope(x):
         return ravel_pytree(derivative(t, unflatten(x), plant))[0]
 
-    _, push = jax.linearize(slope, flat)
+    flat = jax.lax.stop_gradient(flat)
+    here, small = slope(flat), jnp.finfo(flat.dtype).eps ** 0.5
 
     def step(direction, _):
-        new = push(direction)
+        new = (slope(flat + small * direction) - here) / small
         size = jnp.linalg.norm(new)
         return new / jnp.where(size > 0, size, 1.0), size
 
