@@ -21,4 +21,6 @@ for name in given.questions:
         parser.error(f"{name!r} is no question; there are {', '.join(QUESTIONS)}.")
 given.o.mkdir(parents=True, exist_ok=True)
 figures = run(given.o, given.reduced, tuple(given.questions) or tuple(QUESTIONS))
-(given.o / "figures.json").write_text(json.dumps(figures, indent=1) + "\n")
+kept = given.o / "figures.json"  # questions that were not asked keep their answers
+before = json.loads(kept.read_text()) if kept.exists() else {}
+kept.write_text(json.dumps(before | figures, indent=1) + "\n")

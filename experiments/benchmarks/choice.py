@@ -43,9 +43,7 @@ def cases() -> dict[str, Case]:
         dataclasses.replace(j, motor=dataclasses.replace(j.motor, inductance=jf.scalar(4e-4)))
         for j in windings.joints
     )
-    friction = tuple(
-        StribeckFriction(0.05, 0.05, location=f"joint_{i}", transition_rate=1e-3) for i in (1, 2)
-    )
+    friction = tuple(StribeckFriction(0.05, 0.05, location=f"joint_{i}") for i in (1, 2))
     single = jf.foldager_link(modes=2).linear()
     return {
         "slow": Case(slow, TORQUES, MOVE),
@@ -96,7 +94,7 @@ def measure(reduced: bool) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, case in cases().items():
         marched = not case.sample_time
-        fine = jf.Fixed(1e-5 if name == "frictional" else 2e-5) if marched else jf.Adaptive(1e-9, 1e-11)
+        fine = jf.Fixed(2e-5) if marched else jf.Adaptive(1e-9, 1e-11)
         exact = np.asarray(jax.jit(lambda p, c=case, m=fine: tips(c, m, p))(payloads))
         span = float(sum(link.length for link in case.arm.links))
         rows = []

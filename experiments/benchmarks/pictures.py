@@ -40,7 +40,7 @@ def plot_work_precision(found: dict) -> Figure:
 
 def plot_choice(found: dict) -> Figure:
     """Error of the tip against seconds, one panel a kind of loop."""
-    names = [name for name in found if isinstance(found[name], dict)]
+    names = [name for name in found if name != "machine"]
     made, axes = figure(1, len(names), height=3.4, width=2.9 * len(names))
     for axis, name in zip(axes[0], names, strict=True):
         for method, colour in METHODS.items():

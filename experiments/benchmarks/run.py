@@ -185,9 +185,9 @@ QUESTIONS: dict[str, Callable[[bool], dict[str, Any]]] = {
 
 def run(folder: Path, reduced: bool, questions: tuple[str, ...] = tuple(QUESTIONS)) -> dict[str, Any]:
     """Answers every question, or those named, and draws what there is to draw."""
-    figures: dict[str, Any] = {"machine": machine()}
+    figures: dict[str, Any] = {}
     for name in questions:
-        figures[name] = QUESTIONS[name](reduced)
+        figures[name] = {"machine": machine(), **QUESTIONS[name](reduced)}
         print(name, figures[name], flush=True)
     for name, plot in (
         ("work_precision", plot_work_precision), ("scaling", plot_scaling), ("sizes", plot_sizes),

@@ -64,8 +64,15 @@ def simulate(
     - `disturbance`: torques [N m] on the joints beside the motors.
     - `sample_time` [s]: the controller computes a command this often and holds it in
       between; None for the controller's own `period`, or continuous control if it has none.
-    - `method`: `Adaptive(rtol, atol, solver)` (default, 1e-6) or `Fixed(dt, solver)`.
-      Either steps to every jump of reference and disturbance and to every sample.
+    - `method`: `Exact()`, `Adaptive(rtol, atol, solver)` or `Fixed(dt, solver)`; the latter two
+      step to every jump of reference and disturbance and to every sample. By default:
+
+      | loop, by its structure | method |
+      |---|---|
+      | linear, its input polynomial between jumps | `Exact()` |
+      | anything else, sampled control included | `Adaptive()`, an error of 1e-6 |
+
+      `docs/choose.md` says which others are faster where, as measured.
     - `channels`: names of those wanted; all by default. Fewer compile faster.
     - `max_steps`: after which the simulation has failed.
     - `adjoint`: one of diffrax's, to fix how the solve is differentiated; by default
