@@ -9,6 +9,7 @@ COLOURS = {
     "jaxflex": OURS, "vector C": MEASURED, "scalar C": THEIRS, "numba": "tab:olive", "SciPy": "tab:brown",
     "MuJoCo": "tab:purple", "Exudyn": "tab:pink",
 }  # fmt: skip
+MARKERS = {"RK45": "v", "DOP853": "^", "LSODA": "D", "Radau": "P", "BDF": "X"}  # of SciPy
 METHODS = {
     "explicit, adaptive": MEASURED, "implicit, adaptive": "tab:purple", "explicit, fixed": THEIRS,
     "linearly implicit, fixed": OURS, "exact": "k",
@@ -26,7 +27,7 @@ def plot_work_precision(found: dict) -> Figure:
             groups.setdefault(key, []).append((row["seconds"], row["tip error [m]"]))
     for (program, method), points in groups.items():
         x, y = np.array(sorted(points)).T
-        style = "o-" if program == "jaxflex" and method != "RK4" else "s--"
+        style = "o-" if program == "jaxflex" and method != "RK4" else MARKERS.get(method, "s") + "--"
         axis.loglog(x, y, style, color=COLOURS[program], label=f"{program}, {method}")
     axis.axhline(1e-5, color="0.5", linewidth=0.8)
     axis.annotate(
