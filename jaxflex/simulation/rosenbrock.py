@@ -1,4 +1,4 @@
-"""Steps that treat the elastic links and the windings implicitly, all else explicitly.
+"""Steps that treat elastic links, windings and what holds a joint implicitly, all else explicitly.
 
 The fastest rates of an arm are those of its highest modes and windings. They are no part of
 the motion that is wanted, but hold an explicit method to steps of a fraction of their
@@ -8,6 +8,7 @@ whatever matrix stands in for the Jacobian. With
 
     J = [[0, 1], [-M^-1 K, -M^-1 D]] for the arm, -R/L for the windings
 
+K and D with the slopes of drives, controller and friction at each joint on their diagonal,
 a stage costs one right-hand side and one more solve of the size of M. The coefficients are
 those of ROS34PW2 (Rang and Angermann 2005): four stages, order 3, stiffly accurate.
 """
@@ -20,7 +21,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from ..drive import has_current_state
+from ..drive import effect_torques, has_current_state, joint_effects
 from ..dynamics.lagrange import inertia
 from ..dynamics.ldl import factorised, substitute
 from ..scalars import Scalar, dot
@@ -123,13 +124,14 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
 
 
 def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
-    """How drives and controller hold each joint, `-d torque / d angle`, and slow it, `- / d rate`."""
+    """How drives, controller and friction hold each joint, `-d torque / d angle`, and slow it, `- / d rate`."""
     joints = len(plant.model.joints)
 
     def torque(i, angle, rate):
         q = (*state.q[:i], angle, *state.q[i + 1 :])
         qd = (*state.qd[:i], rate, *state.qd[i + 1 :])
-        return -plant.drives(t, state._replace(q=q, qd=qd)).torque[i]
+        felt = effect_torques(joint_effects(plant.model), q[:joints], qd[:joints], t)[i]
+        return -plant.drives(t, state._replace(q=q, qd=qd)).torque[i] - felt
 
     pairs = [jax.grad(torque, (1, 2))(i, state.q[i], state.qd[i]) for i in range(joints)]
     none = (jnp.zeros_like(t),) * (plant.model.size - joints)

@@ -5,6 +5,7 @@ import pytest
 
 import jaxflex as jf
 from controllers import PD, Move, OpenLoop, Step
+from jaxflex.effects import CoulombFriction
 from jaxflex.simulation import rosenbrock
 
 TIMES = jnp.linspace(0.0, 0.6, 4)
@@ -55,6 +56,17 @@ def test_windings_are_taken_in():
         for m in (jf.Fixed(2e-4), jf.Fixed(4e-3, jf.LinearlyImplicit()))
     )
     np.testing.assert_allclose(coarse["tip_y"], exact["tip_y"], atol=1e-4)
+
+
+def test_dry_friction_is_taken_in():
+    # 10 N m s/rad near rest on a joint of 0.02 kg m^2: explicit steps would have to stay below 5 ms
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.02),), effects=(CoulombFriction(0.1),))
+    move = Move((0.0,), (0.5,), 0.3)
+    exact, coarse = (
+        jf.simulate(arm, PD((2.0,), (0.1,)), move, TIMES, method=m)["angle_1"]
+        for m in (jf.Fixed(1e-4), jf.Fixed(1e-2, jf.LinearlyImplicit()))
+    )
+    np.testing.assert_allclose(coarse, exact, atol=2e-3)
 
 
 def test_derivatives_in_both_modes():
