@@ -51,7 +51,7 @@ def cases() -> dict[str, Case]:
         "frictional": Case(
             dataclasses.replace(jf.ahmad_arm(drive="torque"), effects=friction), TORQUES, MOVE
         ),
-        "sampled": Case(jf.ahmad_arm(drive="torque"), PD((6.0, 2.0), (0.5, 0.15)), MOVE, 1e-3),
+        "sampled": Case(jf.foldager_link(modes=1), PD((10.0,), (0.3,)), Move((0.0,), (0.5,), 0.8), 1e-3),
         "linear": Case(single, PD((10.0,), (0.3,)), Shaped(Move((0.0,), (0.5,), 0.5), zvd(7.0, 0.01))),
     }
 

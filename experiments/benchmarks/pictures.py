@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from ..pictures import MEASURED, OURS, THEIRS, figure
 
@@ -52,6 +53,7 @@ def plot_choice(found: dict) -> Figure:
         axis.axhline(1e-5, color="0.5", linewidth=0.8)
         axis.set_title(name)
         axis.set_xlabel("seconds for 32 arms over 1 s")
+        axis.xaxis.set_minor_formatter(NullFormatter())
     axes[0, 0].set_ylabel("largest error of the tip [m]")
     handles = {label: h for a in axes[0] for h, label in zip(*a.get_legend_handles_labels(), strict=True)}
     made.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5, fontsize=8)

@@ -59,14 +59,16 @@ def test_windings_are_taken_in():
 
 
 def test_dry_friction_is_taken_in():
-    # 10 N m s/rad near rest on a joint of 0.02 kg m^2: explicit steps would have to stay below 5 ms
-    arm = jf.Arm((), (jf.Joint(hub_inertia=0.02),), effects=(CoulombFriction(0.1),))
-    move = Move((0.0,), (0.5,), 0.3)
-    exact, coarse = (
-        jf.simulate(arm, PD((2.0,), (0.1,)), move, TIMES, method=m)["angle_1"]
-        for m in (jf.Fixed(1e-4), jf.Fixed(1e-2, jf.LinearlyImplicit()))
+    # near rest the joint is held by 100 N m s/rad, where explicit steps of any use rattle
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.02),), effects=(CoulombFriction(0.1, 1e-3),))
+    exact, implicit, explicit = (
+        jf.simulate(arm, PD((2.0,), (0.1,)), Move((0.0,), (0.5,), 0.3), jnp.array([0.0, 1.0]), method=m)[
+            "rate_1"
+        ][-1]
+        for m in (jf.Fixed(1e-4), jf.Fixed(2e-3, jf.LinearlyImplicit()), jf.Fixed(2e-3))
     )
-    np.testing.assert_allclose(coarse, exact, atol=2e-3)
+    np.testing.assert_allclose(implicit, exact, atol=1e-6)
+    assert abs(explicit - exact) > 1e-3
 
 
 def test_derivatives_in_both_modes():
