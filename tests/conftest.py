@@ -1,7 +1,10 @@
 """Double precision for every test, a compilation cache off, and the data that is kept elsewhere."""
 
 import gc
+import os
 from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers side by side would fight for the cores
 
 import jax
 import pytest

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import jaxflex as jf
-from experiments.study import prepare
 from jaxflex.diagnosis import diagnose
 
 FLOOR = 1.2  # of the noise: held-out error after the fix that counts as gone
@@ -120,7 +119,7 @@ def main() -> None:
     parser.add_argument("--share", default="0/1", help="k/n: every n-th case, from the k-th")
     parser.add_argument("--only", default="", help="cases whose name contains this")
     given = parser.parse_args()
-    prepare()
+    jf.set_up()
     given.o.mkdir(parents=True, exist_ok=True)
     part, of = map(int, given.share.split("/"))
     folders = sorted(p.parent for p in given.cases.glob("*/arm.toml") if given.only in p.parent.name)

@@ -73,7 +73,7 @@ class Arm(eqx.Module):
                         f"drive = {self.drive!r} needs a motor at every joint; joint {number} has "
                         "none: give it one or set the drive to 'torque'."
                     )
-        if len(self.joints) > 1 and any(link.motion == "small" for link in self.links):
+        if len(self.joints) > 1 and any(link.moves_little for link in self.links):
             raise ValueError(
                 f"motion = 'small' makes the arm of one joint linear; this one has {len(self.joints)} "
                 "joints, whose turning is not: leave it out."

@@ -57,7 +57,7 @@ def bodies(model: AssembledArm) -> list[Body]:
     if not payload_moves(model):
         found[-1] = _with_payload(found[-1], model.links[-1], model.arm.payload)
     for i, link in enumerate(model.arm.links):
-        if link.motion == "small":
+        if link.moves_little:
             found[i] = found[i]._replace(spread=None)
     return found
 

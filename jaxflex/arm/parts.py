@@ -44,6 +44,11 @@ class AbstractLink(eqx.Module):
     def mass(self) -> Scalar:
         """Mass of the link [kg]."""
 
+    @property
+    def moves_little(self) -> bool:
+        """True if what deflections add to the inertia about the root is left out."""
+        return False
+
     @abstractmethod
     def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         """The constants of the link between its `joint` and what it carries, `distal`."""
@@ -122,6 +127,11 @@ class Link(AbstractLink):
             thickness=h,
             **options,
         )
+
+    @property
+    def moves_little(self) -> bool:
+        """True of `motion = "small"`."""
+        return self.motion == "small"
 
     @property
     def mass(self) -> Scalar:
