@@ -27,9 +27,15 @@ SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a sha
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
+KNOWN_FORM = 0.001  # the same, where physics leaves little choice of the form
+FORM_IS_KNOWN = {
+    "gravity", "load_torque_bias", "payload_mass", "hub_inertia", "torque_constant", "input_delay",
+    "sensor_bias", "sensor_gain", "sensor_drift", "sensor_lag",
+}  # fmt: skip
 BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant)  # effects that a nominal parameter could be bent to imitate
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
+HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
 
@@ -48,14 +54,15 @@ class Hypothesis:
     def strength(self, other: "Hypothesis", explained: dict[int, float] | None = None) -> float:
         """By how much it beats another, in units of what noise and the model's own error may bring.
 
-        `explained`: what effects already there have gained at each horizon; a share of it
-        may be due to the form that they were given.
+        `explained`: what effects already there, those of `other`, have gained at each horizon; a
+        share of it may be due to the form that they were given.
         """
         shared = self.costs.keys() & other.costs.keys()
         already = explained or {}
+        form = KNOWN_FORM if {e.effect for e in other.effects} <= FORM_IS_KNOWN else FORM
         return max(
             (
-                (other.costs[h] - self.costs[h]) / (allowance(self.fit.count, h) + FORM * already.get(h, 0.0))
+                (other.costs[h] - self.costs[h]) / (allowance(self.fit.count, h) + form * already.get(h, 0.0))
                 for h in shared
             ),
             default=-np.inf,
@@ -243,14 +250,25 @@ class Search:
         return sorted(best.values(), key=lambda ranked: -ranked.strength)
 
     def parts(self, effects: tuple[Candidate, ...]) -> list[Ranked]:
-        """Every change of a part of the arm that is not yet in `effects`, at nothing."""
+        """Every change of a part of the arm that is not yet in `effects`, at nothing.
+
+        A hub's inertia may be many times the nominal one, so it is begun from some sizes.
+        """
         motion = Motion(self.problem, self.runs[0], self.parameters.start)
         taken = {effect.key for effect in effects}
         return [
-            Ranked(candidate, (0.0,) * len(candidate.amplitudes), 0.0, 0.0)
+            Ranked(candidate, start, 0.0, 0.0)
             for candidate in candidates(self.parameters, motion, [])
             if candidate.key not in taken and issubclass(EFFECTS[candidate.effect], PARTS)
+            for start in self._sizes(candidate)
         ]
+
+    def _sizes(self, part: Candidate) -> list[tuple[float, ...]]:
+        nothing = (0.0,) * len(part.amplitudes)
+        if part.effect != "hub_inertia":
+            return [nothing]
+        felt = 1 / self.parameters.lightness[int(part.location.rpartition("_")[2]) - 1]  # kg m^2
+        return [nothing, *((share * felt,) for share in HUBS)]
 
     def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
         names = (*effect.amplitudes, *effect.free)
