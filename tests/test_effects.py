@@ -50,36 +50,47 @@ def test_torques_vanish_at_zero_and_have_finite_gradients_at_rest(name):
     assert make(name, 1.0).name == name and make(name, 1.0).index == 0
 
 
-@pytest.mark.parametrize("name", list(EFFECTS))
-def test_every_effect_simulates_and_is_absent_at_zero(name):
-    times = jnp.linspace(0.0, 0.8, 81)
-    reference = Step((0.0,), (4.0,), 0.1)
-
-    def run(*effects):
-        # at rest at an angle, so that gravity and springs have something to do
-        start = jf.InitialState(angles=jnp.array([0.5]), rates=jnp.array([0.1]))
-        return jf.simulate(rig(*effects), OpenLoop(), reference, times, initial=start)["angle_1"]
-
-    nominal = run()
-    if name != "backlash":  # without a gap its flanks still give way
-        np.testing.assert_allclose(run(make(name, 0.0)), nominal, atol=2e-5)
-    changed = run(make(name, 5.0 if name == "centrifugal_stiffening" else 1.0))
-    assert np.abs(changed - nominal).max() > 1e-4
+def turned(*effects):
+    """Angle of the rig after a step, from rest at an angle: gravity and springs have something to do."""
+    start = jf.InitialState(angles=jnp.array([0.5]), rates=jnp.array([0.1]))
+    times, step = jnp.linspace(0.0, 0.8, 81), Step((0.0,), (4.0,), 0.1)
+    run = jf.simulate(rig(*effects), OpenLoop(), step, times, initial=start, channels=("angle_1",))
+    return run["angle_1"]
 
 
-def test_a_clamp_that_gives_way_is_a_spring_at_the_root():
-    """Against an arm with a free joint held by a spring: the same frequencies."""
-    arm = jf.Arm((jf.Link(0.4, 0.15, 0.7, modes=5),), (jf.Joint(hub_inertia=0.0),), jf.Payload(0.02))
+def test_every_effect_acts_and_is_absent_at_zero():
+    names = [name for name in EFFECTS if name != "backlash"]  # without a gap its flanks still give way
+    strong = {"centrifugal_stiffening": 5.0}
+
+    @jax.jit
+    @jax.vmap
+    def run(sizes):
+        return turned(*(make(name, size) for name, size in zip(names, sizes, strict=True)))
+
+    one_each = jnp.diag(jnp.array([strong.get(name, 1.0) for name in names]))
+    none, *each = run(jnp.concatenate([jnp.zeros((1, len(names))), one_each]))
+    nominal = turned()
+    np.testing.assert_allclose(none, nominal, atol=2e-5)
+    for name, changed in zip(names, each, strict=True):
+        assert np.isfinite(changed).all(), name
+        assert np.abs(changed - nominal).max() > 1e-4, name
+
+
+@pytest.mark.parametrize("name", ["backlash", "coulomb_friction", "gravity", "sensor_lag"])
+def test_an_effect_acts_alone(name):
+    assert np.abs(turned(make(name, 1.0)) - turned()).max() > 1e-4
+
+
+@pytest.mark.parametrize("model", ["assumed_modes", "lumped"])
+def test_a_clamp_that_gives_way_is_a_spring_at_the_root(model):
+    """Against an arm whose joint is free, but for a spring: the same frequencies."""
+    link = jf.Link(0.4, 0.15, 0.7, modes=4, model=model, segments=8)
+    arm = jf.Arm((link,), (jf.Joint(hub_inertia=1e-9),), jf.Payload(0.02))
     spring = 20.0
     held = jf.driven_frequencies(arm, joint_stiffness=jnp.array([spring]))
     for effect in (RootCompliance(1 / spring), JointFlexibility(1 / spring)):
         soft = dataclasses.replace(arm, effects=(effect,))
-        np.testing.assert_allclose(jf.locked_frequencies(soft)[:2], held[:2], rtol=2e-4)
-    lumped = dataclasses.replace(
-        arm, links=(dataclasses.replace(arm.links[0], model="lumped", segments=40),),
-        effects=(RootCompliance(1 / spring),),
-    )  # fmt: skip
-    np.testing.assert_allclose(jf.locked_frequencies(lumped)[:2], held[:2], rtol=5e-3)
+        np.testing.assert_allclose(jf.locked_frequencies(soft)[:2], held[:2], rtol=2e-6)
 
 
 def test_shortening_gives_the_known_stiffness_of_a_turning_beam():

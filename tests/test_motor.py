@@ -83,6 +83,12 @@ def test_drive_without_motor_is_refused():
         jf.Arm((), (jf.Joint(hub_inertia=1.0),), drive="voltage")
 
 
+def test_a_chain_of_masses_on_nothing_is_refused():
+    link = jf.Link(0.4, 0.15, 0.7, model="lumped")
+    with pytest.raises(ValueError, match="give the joint a hub_inertia"):
+        jf.Arm((link,), (jf.Joint(),))
+
+
 def test_functions_transform():
     def speed(resistance):
         axis = MotorAxis(DCMotor(resistance, 0.062, 0.062, inductance=1.5e-3), 3e-4, 2e-4)

@@ -5,6 +5,8 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 
 from ..beam.basis import Distal
 from ..beam.link_model import LinkModel, rigid_link
@@ -73,6 +75,14 @@ class Arm(eqx.Module):
                         f"drive = {self.drive!r} needs a motor at every joint; joint {number} has "
                         "none: give it one or set the drive to 'torque'."
                     )
+        for number, (joint, link) in enumerate(zip(self.joints, self.links, strict=False), 1):
+            inertia = joint.hub_inertia + joint.reflected_inertia
+            chain = isinstance(link, Link) and link.model == "lumped" and link.modes > 0
+            if chain and not isinstance(inertia, Tracer) and np.any(inertia == 0):
+                raise ValueError(
+                    f"joint {number} carries a lumped link and has no inertia: a chain of masses has one spring "
+                    "more than masses then, and cannot be solved; give the joint a hub_inertia."
+                )
         if len(self.joints) > 1 and any(link.moves_little for link in self.links):
             raise ValueError(
                 f"motion = 'small' makes the arm of one joint linear; this one has {len(self.joints)} "

@@ -82,18 +82,18 @@ def test_gradients_of_frequencies():
 def test_lumped_link_converges_to_assumed_modes():
     exact = locked_frequencies(foldager_link(0.02, modes=6))[:2]
     errors = []
-    for segments in (6, 12, 24):
+    for segments in (5, 10, 20):
         lumped = locked_frequencies(foldager_link(0.02, model="lumped", segments=segments))[:2]
         errors.append(np.abs(np.asarray(lumped / exact - 1)))
     ratio = errors[0] / errors[1], errors[1] / errors[2]
     np.testing.assert_allclose(ratio, 4.0, rtol=0.25)  # second order in the length of a segment
-    assert np.all(errors[-1] < 3e-3)
+    assert np.all(errors[-1] < 5e-3)
 
 
 def test_lumped_link_with_hub_and_root_spring():
     spring = jnp.array([5.0])
     exact = driven_frequencies(foldager_link(modes=6, hub_inertia=2e-4), joint_stiffness=spring)[:3]
     lumped = driven_frequencies(
-        foldager_link(model="lumped", segments=40, hub_inertia=2e-4), joint_stiffness=spring
+        foldager_link(model="lumped", segments=20, hub_inertia=2e-4), joint_stiffness=spring
     )[:3]
-    np.testing.assert_allclose(lumped, exact, rtol=3e-3)
+    np.testing.assert_allclose(lumped, exact, rtol=1e-2)

@@ -22,10 +22,12 @@ def test_measures_of_a_rigid_joint_under_bang_bang_torque():
     np.testing.assert_allclose(np.array(TABLE_II[1])[:, :2], [[rise, settled]] * 6, atol=0.02)
 
 
+@pytest.mark.slow
 def test_the_table_does_not_follow_from_what_is_printed(figures):
     assert figures["as_printed"]["misfit"] > 10
 
 
+@pytest.mark.slow
 def test_equations_frozen_at_the_stretched_arm_come_closer(figures):
     tried = figures["choices_with_printed_numbers"]
     assert "linear" in tried[0]["choice"] and "nonlinear" not in tried[0]["choice"]
@@ -34,6 +36,7 @@ def test_equations_frozen_at_the_stretched_arm_come_closer(figures):
     np.testing.assert_allclose(tried[0]["table"][0][-1][2], TABLE_II[0][-1][2], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_the_search_improves_on_the_printed_numbers(figures):
     assert (
         figures["choices_with_fitted_numbers"][0]["misfit"]
