@@ -16,6 +16,8 @@ import jaxflex as jf
 from jaxflex.diagnosis import diagnose
 
 FLOOR = 1.2  # of the noise: held-out error after the fix that counts as gone
+SAID = {True: "met", False: "off", None: ""}
+CLOSE = 0.05  # of a parameter that counts as found
 ALIKE = 3  # names in an ambiguous answer, at most, for it to count as right
 
 
@@ -69,6 +71,18 @@ def right(hidden: list[str], verdict: str, named: list[str], others: list[str]) 
     return verdict == "missing_effect" and named[:1] == hidden
 
 
+def met(result: dict[str, Any]) -> bool | None:
+    """True if every parameter of what is hidden is within 5 % or two standard deviations; None if not named."""
+    found = []
+    for effect in result["truth"]:
+        if effect["name"] not in result["named"]:
+            return None
+        for key, true in effect["values"].items():
+            value, std = result["parameters"][effect["name"]].get(key, (true, 0.0))
+            found.append(abs(value - true) <= max(CLOSE * abs(true), 2 * std))
+    return all(found) if found else None
+
+
 def wilson(hits: int, count: int) -> tuple[float, float]:
     """The 95 % interval of a rate."""
     if count == 0:
@@ -98,16 +112,24 @@ def summary(results: list[dict[str, Any]]) -> str:
         hits = sum(result["right"] for result in found)
         low, high = wilson(hits, len(found))
         lines.append(f"| {kind} | {len(found)} | {hits} | {hits / len(found):.0%} | {low:.0%}–{high:.0%} |")
+    named = [r for r in results if r["right"] and r["hidden"] and r["verdict"] != "unexplained"]
+    gone = sum(r["after_over_floor"] <= FLOOR for r in named)
+    judged = [verdict for verdict in map(met, named) if verdict is not None]
     lines += [
         "",
-        "| hidden | gap | verdict | named | instead of | after / floor | s | right |",
-        "|---|---|---|---|---|---|---|---|",
+        f"Of {len(named)} cases whose effects were named, {gone} are held out within {FLOOR} times the noise floor; "
+        f"of {len(judged)} with the effect itself in first place, {sum(judged)} have every parameter within "
+        f"{CLOSE:.0%} or two stated standard deviations.",
+        "",
+        "| hidden | gap | verdict | named | instead of | after / floor | parameters | s | right |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for result in sorted(results, key=lambda r: (r["hidden"], r["gap"] or 0)):
         lines.append(
             f"| {' + '.join(result['hidden']) or 'nothing'} | {result['gap'] or ''} | {result['verdict']} "
             f"| {', '.join(result['named'])} | {', '.join(result['alternatives'])} "
-            f"| {result['after_over_floor']:.2f} | {result['seconds']:.0f} | {'yes' if result['right'] else 'no'} |"
+            f"| {result['after_over_floor']:.2f} | {SAID[met(result)]} "
+            f"| {result['seconds']:.0f} | {'yes' if result['right'] else 'no'} |"
         )
     return "\n".join(lines) + "\n"
 
