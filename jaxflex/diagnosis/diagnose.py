@@ -122,8 +122,9 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         def confirm(items, before, before_starts, fitted=fitted, explained=explained, confirmed=confirmed):
             for item in items:
                 found = search.confirm(before, before_starts, item, fitted.horizon)
-                confirmed.append((found.strength(fitted, explained), found, search.starts()))
                 say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+                if search.sensible(found):
+                    confirmed.append((found.strength(fitted, explained), found, search.starts()))
 
         confirm(tried, before, before_starts)
         if bent and not (confirmed and decisive(search, simplest(confirmed)[1])):
@@ -131,6 +132,8 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             straight, straight_starts = straightened(search, base)
             parts = sift(search, straight, straight_starts, search.parts(straight.effects))
             confirm(parts, straight, straight_starts)
+        if not confirmed:
+            break
         strength, best, best_starts = simplest(confirmed)
         if strength < STRONG or not _worth_it(fitted, best):
             break

@@ -290,6 +290,12 @@ class Search:
             and item.candidate.count <= effect.count
         ]
 
+    def sensible(self, found: Hypothesis) -> bool:
+        """False if the effect added last came to a size that makes no sense."""
+        last = found.effects[-1]
+        size = (found.fit.vector[self.parameters.position(*last.key, name)] for name in last.amplitudes)
+        return not last.amplitudes or plausible(last, tuple(size))
+
     def confirm(self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int) -> Hypothesis:
         """The candidate added to `base` in full, fitted from `starts`."""
         self.restart(starts)
