@@ -11,10 +11,13 @@ from pathlib import Path
 import equinox
 import jax
 
+from .one_off import OLD_EMITTERS
+
 # One core runs a loop over the arm's motion fastest as one compiled function. XLA does that by
 # itself for loops over less than a kilobyte; a batch of arms needs some megabytes.
 LOOP_BYTES = 100_000_000
 VECTORS = "--xla_cpu_prefer_vector_width=512"
+EMITTERS = "--xla_cpu_use_fusion_emitters=false"
 LOOPS = f"--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold={LOOP_BYTES}"
 FUSION = ",xla_cpu_use_multi_output_fusion"
 
@@ -44,7 +47,9 @@ def set_up(
     here they give NaN instead, which every simulation looks for.
     """
     flags = os.environ.get("XLA_FLAGS", "")
-    wanted = (VECTORS, LOOPS + FUSION if fuse else LOOPS)
+    wanted = [VECTORS, LOOPS + FUSION if fuse else LOOPS]
+    if OLD_EMITTERS:
+        wanted.append(EMITTERS)
     missing = [option for option in wanted if option.split("=")[0] not in flags]
     if missing and _backend_runs():
         warnings.warn(

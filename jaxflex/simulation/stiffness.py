@@ -1,5 +1,6 @@
 """How fast the fastest motion of a closed loop is, for the longest step an explicit solver may take."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -18,7 +19,10 @@ def fastest_rate(t: Scalar, state: State, plant: Plant) -> Scalar:
     positions and rates are of different size and that complex poles make it swing. Slopes are
     differences, good enough for an estimate and compiled in half the time of derivatives.
     """
-    state = jax.lax.stop_gradient(state)
+    # here and not at the end, so that nothing of it is ever differentiated
+    t, state, plant = jtu.tree_map(
+        lambda x: jax.lax.stop_gradient(x) if eqx.is_inexact_array(x) else x, (t, state, plant)
+    )
     flat, unflatten = ravel_pytree(state)
     small = jnp.finfo(flat.dtype).eps ** 0.5
     begin = jnp.cos(1.0 + jnp.arange(flat.shape[0]))
@@ -42,4 +46,4 @@ def fastest_rate(t: Scalar, state: State, plant: Plant) -> Scalar:
     counted = growth[-COUNTED:]
     alive = jnp.all(counted > 0)
     mean = jnp.exp(jnp.mean(jnp.log(jnp.where(alive, counted, 1.0))))
-    return jax.lax.stop_gradient(jnp.where(alive, mean, 0.0))
+    return jnp.where(alive, mean, 0.0)
