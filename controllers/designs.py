@@ -16,6 +16,7 @@ from jaxflex import (
     linearise,
     locked_frequencies,
     mass_matrix,
+    one_off,
     scalar,
 )
 
@@ -69,7 +70,7 @@ def textbook_pd(
     return _textbook(arm.assemble(), pose, omega, feedforward)
 
 
-@eqx.filter_jit
+@one_off
 def _textbook(model: AssembledArm, pose: Float[Array, " joints"], omega: Scalar, feedforward: bool) -> PD:
     arm, n = model.arm, len(model.joints)
     inertia = jnp.diag(mass_matrix(model, jnp.zeros(model.size).at[:n].set(pose)))

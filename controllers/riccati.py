@@ -12,7 +12,7 @@ with S what the change does to the cost at fixed X and K.
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.linalg
+import scipy  # whose parts, imported when first used, take longer to import than all here
 from jaxtyping import Array, Float
 
 from jaxflex import Scalar
@@ -22,10 +22,10 @@ Into = Float[Array, "states inputs"]
 Inputs = Float[Array, "inputs inputs"]
 
 
-def _solved(library, name: str):
+def _solved(name: str, library):
     def call(*matrices):
         try:
-            return np.asarray(library(*map(np.asarray, matrices)))
+            return np.asarray(library()(*map(np.asarray, matrices)))
         except (np.linalg.LinAlgError, ValueError) as error:
             raise ValueError(
                 f"{name}: no stabilising solution ({error}); every mode that does not decay by itself "
@@ -39,8 +39,8 @@ def _solved(library, name: str):
     return solve
 
 
-_continuous = _solved(scipy.linalg.solve_continuous_are, "solve_care")
-_sampled = _solved(scipy.linalg.solve_discrete_are, "solve_dare")
+_continuous = _solved("solve_care", lambda: scipy.linalg.solve_continuous_are)
+_sampled = _solved("solve_dare", lambda: scipy.linalg.solve_discrete_are)
 
 
 @jax.custom_jvp

@@ -85,6 +85,9 @@ from .files.recording import RecordingError as RecordingError
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
 
+# Programs that run once
+from .one_off import one_off as one_off
+
 # Scalars and sensors
 from .scalars import Scalar as Scalar
 from .scalars import ScalarLike as ScalarLike

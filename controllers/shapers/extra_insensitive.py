@@ -9,14 +9,13 @@ n = 2, the two- and three-hump shapers of Singhose, Porter, Tuttle and Singer (1
 n = 3 and 4, and ZV, ZVD, ZVDD as the tolerance goes to zero.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from jaxflex import Scalar, ScalarLike, scalar
+from jaxflex import Scalar, ScalarLike, one_off, scalar
 
 from .shaper import Shaper, decaying, known, mode
 
@@ -78,7 +77,7 @@ def ei(
     return _ei(scalar(frequency), scalar(damping_ratio), share, humps)
 
 
-@eqx.filter_jit
+@one_off
 def _ei(frequency: Scalar, zeta: Scalar, tolerance: Scalar, humps: int) -> Shaper:
     limit = LEVELLED / (humps + 1)
     rough = _weighted(zeta, tolerance, humps)[0]

@@ -1,11 +1,10 @@
 """How much vibration a shaper leaves, and how far off the mode may be."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxflex import Scalar, ScalarLike, scalar
+from jaxflex import Scalar, ScalarLike, one_off, scalar
 
 from .roots import root_between
 from .shaper import Shaper, mode
@@ -51,7 +50,7 @@ def insensitivity(
     return _insensitivity(shaper, scalar(frequency), scalar(damping_ratio), scalar(tolerance))
 
 
-@eqx.filter_jit
+@one_off
 def _insensitivity(shaper: Shaper, frequency: Scalar, damping_ratio: Scalar, tolerance: Scalar) -> Scalar:
     def excess(ratio):
         return residual_ratio(shaper, frequency * ratio, damping_ratio) / (tolerance * (1 + TOUCHING)) - 1

@@ -1,11 +1,10 @@
 """Several modes at once. `convolve` puts shapers in series; here all modes are designed for together."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxflex import ScalarLike, scalar
+from jaxflex import ScalarLike, one_off, scalar
 
 from .roots import root_between
 from .shaper import Shaper, mode
@@ -33,7 +32,7 @@ def zero_placement(frequencies: Modes, damping_ratios: Modes, spacing: ScalarLik
     return Shaper(weights / weights.sum(), h * jnp.arange(weights.shape[0]))
 
 
-@eqx.filter_jit
+@one_off
 def simultaneous(frequencies: Modes, damping_ratios: Modes) -> Shaper:
     """Zero placement at the shortest spacing at which no amplitude is negative.
 

@@ -8,8 +8,7 @@ damping the kernel is weighted with the decay of the mode, so that its zero stay
 
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import spherical_jn
+import scipy  # whose parts, imported when first used, take longer to import than all here
 
 from jaxflex import ScalarLike, scalar
 
@@ -40,11 +39,12 @@ def polynomial(frequency: ScalarLike, damping_ratio: ScalarLike = 0.0, order: in
     """
     if order < 0:
         raise ValueError(f"order = {order}: at least 0 is allowed.")
+    bessel = scipy.special.spherical_jn
     # the zeros of j_n and of j_(n-1) interlace, and the first is beyond n + 1
     low, high = order + 1.0, order + 1.0
-    while spherical_jn(order, low) * spherical_jn(order, high) > 0:
+    while bessel(order, low) * bessel(order, high) > 0:
         high += 0.5
-    zero = float(brentq(lambda x: spherical_jn(order, x), low, high, xtol=1e-14))  # pyright: ignore
+    zero = float(scipy.optimize.brentq(lambda x: bessel(order, x), low, high, xtol=1e-14))  # pyright: ignore
     return _kernel(lambda x: (x * (1 - x)) ** order, zero / np.pi, frequency, damping_ratio)
 
 

@@ -17,7 +17,7 @@ from functools import lru_cache
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import root
+import scipy  # whose parts, imported when first used, take longer to import than all here
 
 from jaxflex import ScalarLike, scalar
 
@@ -103,7 +103,7 @@ def _spread(humps: int, width: float, tolerance: float) -> tuple[np.ndarray, np.
 
     x = np.concatenate([2 * spread[:free], offsets**2, tops[: humps - 1] / stretch])
     for near in np.linspace(common, width, STEPS):
-        x = root(equations, x, (1 - near / 2, 1 + near / 2), tol=1e-13).x
+        x = scipy.optimize.root(equations, x, (1 - near / 2, 1 + near / 2), tol=1e-13).x
     error = np.abs(equations(x, 1 - width / 2, 1 + width / 2)).max()
     a, centre, squares, _ = parts(x)
     if not error < 1e-8 or squares.min() < 0:

@@ -4,13 +4,12 @@ They are shorter than shapers of positive impulses, ask for twice their accelera
 and may excite modes above the one they cancel.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from jaxflex import Scalar, ScalarLike, scalar
+from jaxflex import Scalar, ScalarLike, one_off, scalar
 
 from .shaper import Shaper, known, mode
 
@@ -30,7 +29,7 @@ def _alternating(frequency: ScalarLike, damping_ratio: ScalarLike, start: tuple[
     return _solved(f, zeta, start)
 
 
-@eqx.filter_jit
+@one_off
 def _solved(frequency: Scalar, damping_ratio: Scalar, start: tuple[float, ...]) -> Shaper:
     amplitudes = (-1.0) ** jnp.arange(len(start) + 1)
 

@@ -1,6 +1,5 @@
 """Natural frequencies of an arm, its joints free, locked or held by springs."""
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -10,6 +9,7 @@ from ..beam.basis import make_basis
 from ..beam.eigen import whiten
 from ..beam.mode_shapes import natural_frequencies as beam_frequencies
 from ..dynamics.lagrange import mass_matrix
+from ..one_off import one_off
 from ..scalars import scalar
 
 JointVector = Float[Array, " joints"]
@@ -40,7 +40,7 @@ def driven_frequencies(
     return _driven(arm.assemble(), pose, joint_stiffness)
 
 
-@eqx.filter_jit
+@one_off
 def _driven(
     model: AssembledArm, pose: JointVector | None, joint_stiffness: JointVector | None
 ) -> Float[Array, " coordinates"]:
@@ -55,7 +55,7 @@ def locked_frequencies(arm: Arm, pose: JointVector | None = None) -> Float[Array
     return _locked(arm.assemble(), pose)
 
 
-@eqx.filter_jit
+@one_off
 def _locked(model: AssembledArm, pose: JointVector | None) -> Float[Array, " shapes"]:
     n = len(model.joints)
     if model.size == n:
@@ -64,7 +64,7 @@ def _locked(model: AssembledArm, pose: JointVector | None) -> Float[Array, " sha
     return undamped_frequencies(jnp.diag(jnp.stack(model.stiffness()[n:])), mass)
 
 
-@eqx.filter_jit
+@one_off
 def clamped_frequencies(arm: Arm, link: int) -> Float[Array, " modes"]:
     """Frequencies [Hz] of link `link` clamped at its root with all that hangs on it at its tip.
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.core import Tracer
@@ -12,6 +11,7 @@ from jaxtyping import Array, Complex, Float
 
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference, Setpoint
+from ..one_off import one_off
 from ..scalars import Scalar, scalar
 from ..sensors import channel_names, read_channels
 from ..simulation.plant import Plant, State, derivative
@@ -95,7 +95,7 @@ def linearise(
     return _linearise(arm.assemble(), pose, controller, None if channels is None else tuple(channels))
 
 
-@eqx.filter_jit
+@one_off
 def _linearise(
     model: AssembledArm,
     pose: Float[Array, " joints"],

@@ -8,7 +8,6 @@ controller then asks for, `L = -v/u` is the gain around the loop; it must not me
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
@@ -16,6 +15,7 @@ from jaxtyping import Array, Complex, Float
 
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, Setpoint
+from ..one_off import one_off
 from ..scalars import Scalar, scalar
 from ..simulation.plant import Plant, derivative
 from .linear import resting_reference
@@ -83,7 +83,7 @@ def cut_loop(arm: Arm, pose: Float[Array, " joints"], controller: AbstractContro
     return _cut_loop(arm.assemble(), pose, controller)
 
 
-@eqx.filter_jit
+@one_off
 def _cut_loop(model: AssembledArm, pose: Float[Array, " joints"], controller: AbstractController) -> CutLoop:
     zero, period = scalar(0.0), controller.period()
     angles = tuple(scalar(a) for a in pose)
@@ -138,7 +138,7 @@ def margins(arm: Arm, pose: Float[Array, " joints"], controller: AbstractControl
     return _all_margins(cut_loop(arm, pose, controller))
 
 
-@eqx.filter_jit
+@one_off
 def _all_margins(loop: CutLoop) -> Margins:
     grid = _grid(loop)
     gain, down, phase, modulus = zip(*(_margins(loop, i, grid) for i in range(loop.B.shape[1])), strict=True)

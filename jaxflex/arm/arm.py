@@ -12,6 +12,7 @@ from ..beam.basis import Distal
 from ..beam.link_model import LinkModel, rigid_link
 from ..brief import brief
 from ..effects import AbstractBodyEffect, AbstractEffect
+from ..one_off import one_off
 from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
 from .parts import AbstractLink, Joint, Link, Payload
 
@@ -148,7 +149,7 @@ class Arm(eqx.Module):
             root_stiffness=own.root_stiffness if isinstance(own, Link) else scalar(0.0),
         )
 
-    @eqx.filter_jit
+    @one_off
     def assemble(self) -> "AssembledArm":
         """The arm with its body effects applied and every constant of its links computed."""
         arm = self

@@ -1,5 +1,7 @@
 """The deflection shapes a link is allowed: raw shapes, turned tangent at the root and made orthogonal."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -56,37 +58,32 @@ class Basis(eqx.Module):
     mixing: Float[Array, "raw shapes"]
     end_moment: bool = eqx.field(static=True)
     give: Scalar  # c EI [m]: root rotation for a unit of curvature there
+    root_slope: Float[Array, " modes"]  # phi'(0) [1/m]
+    root_curvature: Float[Array, " raw"]  # [1/m^2]
 
-    def _raw(self, modal: Array, root_slope: Array, moment: Array, arm: Scalar) -> Array:
-        values = modal - root_slope
-        values = jnp.append(values, moment) if self.end_moment else values
-        return values + self.give * arm * self._root_curvature()
-
-    def _root_curvature(self) -> Array:
-        bend = self.modes.curvature(jnp.zeros_like(self.modes.length))
-        return jnp.append(bend, 2 / self.modes.length**2) if self.end_moment else bend
+    def _mixed(self, modal: Array, moment: Array, turned: Array) -> Array:
+        """Shapes of values `modal` and `moment` at points where a unit rotation of the root makes `turned`."""
+        values = modal - turned[..., None] * self.root_slope
+        if self.end_moment:
+            values = jnp.concatenate([values, moment[..., None]], axis=-1)
+        return (values + self.give * turned[..., None] * self.root_curvature) @ self.mixing
 
     def root_rotation(self) -> Float[Array, " shapes"]:
         """Rotation [rad] of the root against the hub for a unit of each shape."""
-        return self.give * self._root_curvature() @ self.mixing
+        return self.give * self.root_curvature @ self.mixing
 
-    def deflection(self, x: Scalar) -> Float[Array, " shapes"]:
+    def deflection(self, x: Float[Array, "*points"]) -> Float[Array, "*points shapes"]:
         """`psi_k(x)`, dimensionless, at `x` [m] from the root."""
-        length = self.modes.length
-        root_slope = self.modes.slope(jnp.zeros_like(length)) * x
-        return self._raw(self.modes.deflection(x), root_slope, (x / length) ** 2, x) @ self.mixing
+        return self._mixed(self.modes.deflection(x), (x / self.modes.length) ** 2, x)
 
-    def slope(self, x: Scalar) -> Float[Array, " shapes"]:
+    def slope(self, x: Float[Array, "*points"]) -> Float[Array, "*points shapes"]:
         """`psi_k'(x)` [1/m]."""
-        length = self.modes.length
-        root_slope = self.modes.slope(jnp.zeros_like(length))
-        one = jnp.ones_like(length)
-        return self._raw(self.modes.slope(x), root_slope, 2 * x / length**2, one) @ self.mixing
+        return self._mixed(self.modes.slope(x), 2 * x / self.modes.length**2, jnp.ones_like(x))
 
-    def curvature(self, x: Scalar) -> Float[Array, " shapes"]:
+    def curvature(self, x: Float[Array, "*points"]) -> Float[Array, "*points shapes"]:
         """`psi_k''(x)` [1/m^2]."""
-        length, none = self.modes.length, jnp.zeros(())
-        return self._raw(self.modes.curvature(x), none, 2 / length**2, none) @ self.mixing
+        bent = jnp.full_like(x, 2 / self.modes.length**2)
+        return self._mixed(self.modes.curvature(x), bent, jnp.zeros_like(x))
 
 
 def quadrature(length: Scalar) -> tuple[Float[Array, " points"], Float[Array, " points"]]:
@@ -147,19 +144,21 @@ def make_basis(
     shapes = solve_mode_shapes(length, ends, modes)
     end_moment = kind == "distal_mass_and_moment" and carries_link
     give = root_compliance * flexural_rigidity
-    raw = Basis(shapes, jnp.eye(modes + end_moment), end_moment, give)
+    root_curvature = shapes.curvature(zero)
+    if end_moment:
+        root_curvature = jnp.append(root_curvature, 2 / length**2)
+    raw = Basis(shapes, jnp.eye(modes + end_moment), end_moment, give, shapes.slope(zero), root_curvature)
 
     points, weights = quadrature(length)
-    phi = jax.vmap(raw.deflection)(points)
-    bend = jax.vmap(raw.curvature)(points)
+    phi, bend = raw.deflection(points), raw.curvature(points)
     tip, tip_slope = raw.deflection(length), raw.slope(length)
     mass = (
         mass_per_length * (phi.T * weights) @ phi
         + tip_mass * jnp.outer(tip, tip)
         + tip_inertia * jnp.outer(tip_slope, tip_slope)
     )
-    moment = flexural_rigidity * raw.curvature(zero)
+    moment = flexural_rigidity * root_curvature
     stiffness = flexural_rigidity * (bend.T * weights) @ bend + root_compliance * jnp.outer(moment, moment)
     mixing = orthogonalise(mass, stiffness, link_mass)
     upward = jnp.where(tip @ mixing < 0, -1.0, 1.0)
-    return Basis(shapes, mixing * upward, end_moment, give)
+    return dataclasses.replace(raw, mixing=mixing * upward)

@@ -15,19 +15,19 @@ their cancellation, so that high modes stay accurate. The ends state
 which gives, as special cases, the frequency equations of the papers: Ahmad (23) for
 the clamp with tip mass and inertia, Foldager's `cosh cos = -1` for clamped-free, and
 `tan z = tanh z` for pinned-free. The determinant of these conditions is the frequency
-equation; its roots are found by `optimistix` and differentiated implicitly.
+equation; its roots are found by bisection and differentiated implicitly.
 """
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..scalars import Scalar
 
 GRID_PER_PI = 64  # points a half wave at which the frequency equation is sampled
+HALVINGS = 50  # of a bracket, which leave no more than rounding
 SMALLEST_ROOT = 5e-3  # below it lies only the rigid rotation of a free hinge
 
 
@@ -93,25 +93,26 @@ def wave_numbers(ends: Ends, modes: int) -> Float[Array, " modes"]:
     """
     top = (modes + 1) * np.pi
     grid = jnp.asarray(np.linspace(SMALLEST_ROOT, top, GRID_PER_PI * (modes + 1) + 1))
-    fixed = jax.lax.stop_gradient(ends)
-    positive = jax.vmap(frequency_equation, (0, None))(grid, fixed) > 0
-    crossing = positive[1:] != positive[:-1]
-    order = jnp.cumsum(crossing)
-    solver = optx.Bisection(rtol=4 * float(jnp.finfo(grid.dtype).eps), atol=0.0, flip="detect")
+    equations = jax.vmap(frequency_equation, (0, None))
 
-    def root(mode):
-        found = crossing & (order == mode + 1)
-        index = jnp.argmax(found)
-        low, high = grid[index], grid[index + 1]
-        solution = optx.root_find(
-            frequency_equation,
-            solver,
-            (low + high) / 2,
-            args=ends,
-            options={"lower": low, "upper": high},
-            max_steps=64,
-            throw=False,
-        )
-        return jnp.where(found.any(), solution.value, jnp.nan)
+    def bisected(equation, _):
+        positive = equations(grid, ends) > 0
+        crossing = positive[1:] != positive[:-1]
+        found = crossing & (jnp.cumsum(crossing) == jnp.arange(1, modes + 1)[:, None])
+        index = jnp.argmax(found, axis=1)
+        below = positive[index]
 
-    return jax.vmap(root)(jnp.arange(modes))
+        def halve(_, bracket):
+            low, high = bracket
+            middle = (low + high) / 2
+            same = (equation(middle) > 0) == below
+            return jnp.where(same, middle, low), jnp.where(same, high, middle)
+
+        low, high = jax.lax.fori_loop(0, HALVINGS, halve, (grid[index], grid[index + 1]))
+        return jnp.where(found.any(axis=1), (low + high) / 2, jnp.nan)
+
+    def solved(slope, right):
+        # every mode has an equation of its own, so that their Jacobian is diagonal
+        return right / slope(jnp.ones_like(right))
+
+    return jax.lax.custom_root(lambda z: equations(z, ends), jnp.zeros(modes), bisected, solved)

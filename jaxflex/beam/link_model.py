@@ -124,8 +124,7 @@ def assumed_modes_link(
     """
     length = basis.modes.length
     points, weights = quadrature(length)
-    psi = jax.vmap(basis.deflection)(points)
-    bend = jax.vmap(basis.curvature)(points)
+    psi, bend = basis.deflection(points), basis.curvature(points)
     rho = mass_per_length * weights
     mass = mass_per_length * length
     root = basis.root_rotation()
@@ -172,11 +171,11 @@ def _shortening(basis: Basis, mass_per_length: Scalar, share: Scalar, loose: boo
 
     def slopes(x):
         slope = basis.slope(x)
-        return jnp.append(slope, 1.0) if loose else slope
+        return jnp.column_stack([slope, jnp.ones_like(x)]) if loose else slope
 
     def upto(x):
         inner, inner_weights = points * x / length, weights * x / length
-        slope = jax.vmap(slopes)(inner)
+        slope = slopes(inner)
         return (slope.T * inner_weights) @ slope
 
     at = jax.vmap(upto)(points)

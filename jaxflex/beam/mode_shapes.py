@@ -3,10 +3,14 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..scalars import Scalar
 from .boundary import Ends, wave_numbers
+
+# of the terms with (A, B, C, D): what stands with each of them in the derivative by z x/l
+_DERIVATIVE = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
 
 
 class ModeShapes(eqx.Module):
@@ -23,28 +27,23 @@ class ModeShapes(eqx.Module):
     wave_numbers: Float[Array, " modes"]
     coefficients: Float[Array, "modes 4"]
 
-    def _terms(self, x: Scalar) -> tuple[Array, Array, Array, Array]:
-        z = self.wave_numbers
-        xi = x / self.length
-        return jnp.cos(z * xi), jnp.sin(z * xi), jnp.exp(-z * xi), jnp.exp(-z * (1 - xi))
+    def _derivative(self, x: Array, order: int) -> Array:
+        z, xi = self.wave_numbers, x[..., None] / self.length
+        terms = jnp.stack([jnp.cos(z * xi), jnp.sin(z * xi), jnp.exp(-z * xi), jnp.exp(-z * (1 - xi))], -1)
+        coefficients = self.coefficients @ np.linalg.matrix_power(_DERIVATIVE, order)
+        return (z / self.length) ** order * jnp.sum(coefficients * terms, axis=-1)
 
-    def deflection(self, x: Scalar) -> Float[Array, " modes"]:
+    def deflection(self, x: Float[Array, "*points"]) -> Float[Array, "*points modes"]:
         """`phi_j(x)`, dimensionless, at `x` [m] from the root."""
-        c, s, e, f = self._terms(x)
-        a, b, d, g = self.coefficients.T
-        return a * c + b * s + d * e + g * f
+        return self._derivative(x, 0)
 
-    def slope(self, x: Scalar) -> Float[Array, " modes"]:
+    def slope(self, x: Float[Array, "*points"]) -> Float[Array, "*points modes"]:
         """`phi_j'(x)` [1/m]."""
-        c, s, e, f = self._terms(x)
-        a, b, d, g = self.coefficients.T
-        return self.wave_numbers / self.length * (-a * s + b * c - d * e + g * f)
+        return self._derivative(x, 1)
 
-    def curvature(self, x: Scalar) -> Float[Array, " modes"]:
+    def curvature(self, x: Float[Array, "*points"]) -> Float[Array, "*points modes"]:
         """`phi_j''(x)` [1/m^2]."""
-        c, s, e, f = self._terms(x)
-        a, b, d, g = self.coefficients.T
-        return (self.wave_numbers / self.length) ** 2 * (-a * c - b * s + d * e + g * f)
+        return self._derivative(x, 2)
 
 
 def solve_mode_shapes(length: Scalar, ends: Ends, modes: int) -> ModeShapes:

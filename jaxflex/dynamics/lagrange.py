@@ -7,6 +7,8 @@ derivatives without an array in sight, so that XLA fuses them and a batch of arm
 becomes a struct of arrays.
 """
 
+from collections.abc import Callable
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -16,7 +18,7 @@ from ..arm.arm import AssembledArm
 from ..arm.energy import kinetic_energy, potential_energy
 from ..scalars import Scalar
 from .ldl import solve
-from .simplify import simplified
+from .simplify import simplified, traced
 
 Coordinates = Float[Array, " coordinates"]
 Matrix = Float[Array, "coordinates coordinates"]
@@ -52,14 +54,15 @@ def damping_vector(model: AssembledArm) -> Coordinates:
     return jnp.stack(model.damping())
 
 
-def _inertia(model: AssembledArm, q: tuple, qd: tuple) -> list[list[Scalar]]:
-    size = len(q)
+def _along_each(momentum: Callable, qd: tuple) -> list[list[Scalar]]:
+    """Lower triangle of the derivative of `momentum`, a function of the rates, row by row."""
+    size = len(qd)
     columns = []
     for j in range(size):
         # differentiating along one rate at a time lets autodiff drop all that does not
         # depend on it, which a vmap over unit vectors could not
         def along(rate, j=j):
-            return jax.grad(kinetic_energy, argnums=2)(model, q, (*qd[:j], rate, *qd[j + 1 :]))
+            return momentum((*qd[:j], rate, *qd[j + 1 :]))
 
         columns.append(jax.jvp(along, (qd[j],), (jnp.ones_like(qd[j]),))[1])
     return [[columns[j][i] for j in range(i + 1)] for i in range(size)]
@@ -68,7 +71,9 @@ def _inertia(model: AssembledArm, q: tuple, qd: tuple) -> list[list[Scalar]]:
 @simplified
 def inertia(model: AssembledArm, q: tuple) -> list[list[Scalar]]:
     """Lower triangle of `M(q)` over scalars, row by row."""
-    return _inertia(model, q, tuple(jnp.zeros_like(x) for x in q))
+    qd = tuple(jnp.zeros_like(x) for x in q)
+    momentum = traced(jax.grad(kinetic_energy, argnums=2), model, q, qd)
+    return _along_each(lambda qd: momentum(model, q, qd), qd)
 
 
 @simplified
@@ -78,13 +83,11 @@ def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tup
     The bias `d/dt(dL/dq')|_{q''=0} - dL/dq` holds Coriolis, centrifugal, gravity and
     elastic terms; `force` everything else (damping, friction, motors, disturbances).
     """
-
-    def momentum(q, qd):
-        return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
-
-    lower = _inertia(model, q, qd)
-    drift = jax.jvp(lambda q: momentum(q, qd), (q,), (qd,))[1]
-    slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
+    energy = traced(kinetic_energy, model, q, qd)
+    momentum = traced(jax.grad(energy, argnums=2), model, q, qd)
+    lower = _along_each(lambda qd: momentum(model, q, qd), qd)
+    drift = jax.jvp(lambda q: momentum(model, q, qd), (q,), (qd,))[1]
+    slope = jax.grad(lambda q: energy(model, q, qd) - potential_energy(model, q))(q)
     right = tuple(f - d + s for f, d, s in zip(force, drift, slope, strict=True))
     return solve(lower, right)
 

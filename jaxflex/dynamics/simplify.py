@@ -11,6 +11,7 @@ after it is traced, before anything is done with it.
 
 from collections.abc import Callable
 from functools import wraps
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -24,14 +25,24 @@ def simplified(function: Callable) -> Callable:
     @eqx.filter_jit
     @wraps(function)
     def call(*args):
-        arrays, static = eqx.partition(args, eqx.is_array)
-        leaves, tree = jtu.tree_flatten(arrays)
+        return traced(function, *args)(*args)
 
-        def flat(*leaves):
-            return function(*eqx.combine(jtu.tree_unflatten(tree, leaves), static))
+    return call
 
-        program, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
-        outputs = core.jaxpr_as_fun(without_waste(program))(*leaves)
+
+def traced(function: Callable, *args: Any) -> Callable:
+    """`function` of pytrees like `args` as its cleaned program, which is quickly differentiated many times."""
+    arrays, static = eqx.partition(args, eqx.is_array)
+    leaves, tree = jtu.tree_flatten(arrays)
+
+    def flat(*leaves):
+        return function(*eqx.combine(jtu.tree_unflatten(tree, leaves), static))
+
+    program, shape = jax.make_jaxpr(flat, return_shape=True)(*leaves)
+    run = core.jaxpr_as_fun(without_waste(program))
+
+    def call(*args):
+        outputs = run(*jtu.tree_leaves(eqx.filter(args, eqx.is_array)))
         return jtu.tree_unflatten(jtu.tree_structure(shape), outputs)
 
     return call

@@ -15,8 +15,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
+import scipy  # whose parts, imported when first used, take longer to import than all here
 
 from ..sensors import unit as si
 from ..simulation.frames import extra
@@ -32,8 +31,8 @@ def read_mat(file: str) -> Table:
     try:
         with open(file, "rb") as stream:
             is_hdf = b"MATLAB 7.3" in stream.read(128)
-        found = _read_hdf(file) if is_hdf else loadmat(file, simplify_cells=True)
-    except (OSError, ValueError, TypeError, IndexError, MatReadError) as error:
+        found = _read_hdf(file) if is_hdf else scipy.io.loadmat(file, simplify_cells=True)
+    except (OSError, ValueError, TypeError, IndexError, scipy.io.matlab.MatReadError) as error:
         raise RecordingError(f"{file}: cannot be read as a MATLAB file: {error}.") from error
     found = {name: value for name, value in found.items() if not name.startswith(("__", "#"))}
     units = found.pop("units", {})

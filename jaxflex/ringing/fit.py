@@ -12,7 +12,7 @@ with a memory widens it.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy  # whose parts, imported when first used, take longer to import than all here
 
 from .stretches import Stretch
 
@@ -64,8 +64,6 @@ def poles_of(modes: np.ndarray) -> np.ndarray:
 
 def columns(stretch: Stretch, poles: np.ndarray, every: int = 1) -> np.ndarray:
     """What every channel is made of at `every` n-th sample: `(times, columns)`, the waves of a pole side by side."""
-    from scipy.signal import lfilter  # noqa: PLC0415 -- takes longer to import than all else here
-
     t = stretch.times
     drives = stretch.inputs - stretch.inputs[:, :1]
     parts = [np.ones_like(t), t / t[-1], *drives]
@@ -74,7 +72,7 @@ def columns(stretch: Stretch, poles: np.ndarray, every: int = 1) -> np.ndarray:
         turn = np.exp(pole * stretch.step)
         for drive in drives:
             held = (turn - 1) / pole * np.concatenate([[0.0], drive[:-1]])
-            waves.append(lfilter([1.0], [1.0, -turn], held))
+            waves.append(scipy.signal.lfilter([1.0], [1.0, -turn], held))
         for wave in waves:
             parts.append(wave.real)
             if np.imag(pole):
@@ -130,7 +128,7 @@ def fit_modes(stretches: list[Stretch], start: np.ndarray, real: np.ndarray) -> 
     scale = np.concatenate(
         [np.column_stack([start[0::2], np.full(count // 2, 0.05)]).ravel(), np.ones(len(real))]
     )
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         residuals,
         np.clip(first, low + 1e-9, high - 1e-9),
         slopes,  # pyright: ignore

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+import scipy  # whose parts, imported when first used, take longer to import than all here
 
 from ..files.checks import dead
 from ..files.recording import Recording, RecordingError
@@ -128,7 +128,9 @@ def _of_piece(
 def _still(inputs: np.ndarray, least: int) -> list[tuple[int, int]]:
     """Where no input leaves a band of `STILL` of its range within any `least` samples: first and last + 1."""
     whole = np.ptp(inputs, axis=1, keepdims=True)
-    width = maximum_filter1d(inputs, least, axis=1) - minimum_filter1d(inputs, least, axis=1)
+    width = scipy.ndimage.maximum_filter1d(inputs, least, axis=1) - scipy.ndimage.minimum_filter1d(
+        inputs, least, axis=1
+    )
     middles = np.all(width <= STILL * whole, axis=0)
     starts = np.flatnonzero(middles[least // 2 : inputs.shape[1] - least + least // 2 + 1])
     if not len(starts):

@@ -267,7 +267,7 @@ def _integrate(
             channels[f"reference_{number}"] = value
         return state, {name: channels[name] for name in wanted}
 
-    states, channels = jax.vmap(read)(times, states)
+    states, channels = jax.lax.map(lambda given: read(*given), (times, states))
     for effect in plant.model.arm.effects:
         if isinstance(effect, AbstractSensorEffect) and effect.location in channels:
             channels[effect.location] = effect.read(times, channels[effect.location])
