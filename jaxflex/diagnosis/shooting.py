@@ -23,7 +23,7 @@ from .delay import delayed
 from .normal import Normal, solve
 from .parameters import Parameters
 from .plant import Instruments, Pieces, Response, Stepping, respond
-from .steps import LANES, Intervals, Steps, along_pieces
+from .steps import LANES, Intervals, Point, Steps, along_pieces
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
@@ -38,22 +38,6 @@ class Slopes:
     by_start: np.ndarray  # (pieces, samples, channels, states)
     end_by_start: np.ndarray  # (pieces, states, states)
     by_column: dict[int, tuple[np.ndarray, np.ndarray]]  # readings (pieces, samples, channels), ends
-
-
-@dataclass(frozen=True)
-class Point:
-    """What slopes by the intervals of a run were taken at, and those found there so far."""
-
-    vector: np.ndarray
-    starts: np.ndarray
-    command: np.ndarray
-    steps: Steps
-    by_parameter: dict[int, np.ndarray]  # outcomes of the intervals, (pieces, samples, outcomes)
-
-    def is_at(self, vector: np.ndarray, run: "Run") -> bool:
-        """True if nothing has changed since."""
-        pairs = ((vector, self.vector), (run.starts, self.starts), (run.command, self.command))
-        return all(np.array_equal(a, b) for a, b in pairs)
 
 
 @dataclass
@@ -271,9 +255,16 @@ class Problem:
             added[..., states + len(columns) :] = steps.by_input[:, k, :, : acting.shape[1]] @ acting
             return added
 
-        reading, end = along_pieces(
-            steps, response, pieces, self.instruments(vector), start, source, self._instruments_along(unit)
-        )
+        with np.errstate(all="ignore"):  # a piece may leave all bounds
+            reading, end = along_pieces(
+                steps,
+                response,
+                pieces,
+                self.instruments(vector),
+                start,
+                source,
+                self._instruments_along(unit),
+            )
         reading = reading / self.setting.noise[:, None]
         return np.where(run.valid[..., None, None], reading, 0.0), end
 
@@ -282,9 +273,9 @@ class Problem:
     ) -> tuple[Steps, dict[int, np.ndarray]]:
         """The intervals of a run made linear, and their slopes by parameters of the arm."""
         intervals = Intervals(self._model(jnp.asarray(vector)), self.setting.channels, pieces, response)
-        if run.point is None or not run.point.is_at(vector, run):
-            here = (vector.copy(), run.starts.copy(), run.command)
-            run.point = Point(*here, intervals.steps(), {})
+        here = (vector, run.starts, run.command)
+        if run.point is None or not run.point.is_at(*here):
+            run.point = Point(*(part.copy() for part in here), intervals.steps(), {})
         known = run.point.by_parameter
         missing = [column for column in columns if column not in known]
         groups = [missing[k : k + LANES] for k in range(0, len(missing), LANES)]

@@ -40,6 +40,21 @@ class Steps:
     by_input: np.ndarray  # columns: commands, then forces on the coordinates
 
 
+@dataclass(frozen=True)
+class Point:
+    """What the intervals of a run were made linear about, and all slopes found there so far."""
+
+    vector: np.ndarray
+    starts: np.ndarray
+    command: np.ndarray
+    steps: Steps
+    by_parameter: dict[int, np.ndarray]  # outcomes of the intervals, (pieces, samples, outcomes)
+
+    def is_at(self, *here: np.ndarray) -> bool:
+        """True if vector, starts and command are still these."""
+        return all(map(np.array_equal, here, (self.vector, self.starts, self.command)))
+
+
 class Intervals:
     """The intervals of the pieces that gave a `response`, to be made linear there."""
 
@@ -89,7 +104,7 @@ class Intervals:
         point = [np.concatenate(part)[:count].reshape(*self.shape, -1) for part in parts[:4]]
         x, friction, before, after = (np.concatenate(part, 1)[:, :count] for part in parts[4:])
         outcomes = [x, friction, before, after] if self.feels_friction else [x, before, after]
-        table = np.moveaxis(np.concatenate(outcomes, -1), 0, -1)
+        table = np.ascontiguousarray(np.moveaxis(np.concatenate(outcomes, -1), 0, -1))
         return Interval(*point), table.reshape(*self.shape, *table.shape[1:])
 
 
