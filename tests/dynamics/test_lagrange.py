@@ -62,7 +62,7 @@ def test_scalar_accelerations_agree_with_the_matrices(model):
 
 @pytest.mark.parametrize("by_model", [True, False])
 def test_linearisable_accelerations_have_the_slopes_of_the_others(by_model):
-    model = jf.ahmad_arm().assemble()
+    model = jf.foldager_link(0.02).assemble()
     q, qd = (tuple(part) for part in state(model, 4))
     arrays, static = eqx.partition(model, eqx.is_inexact_array)
 
