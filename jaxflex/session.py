@@ -34,8 +34,8 @@ def set_up(
     `fuse`: let XLA compute values that several results share once instead of once for each.
     Batches under `Fixed` are two to four times as fast and compile in half the time. Off by
     default, since XLA has the option off: the compiler of jaxlib 0.10.2 aborts on batched
-    solves by diffrax (`Adaptive` under `vmap`) with it. For sweeps, and diagnoses, which take
-    a third of the time with it, in a process of their own.
+    solves by diffrax (`Adaptive` under `vmap`) with it. For sweeps, and diagnoses, whose slopes
+    take a third of the time with it, in a process of their own.
 
     A program that calls back to Python cannot be kept, and equinox's run-time checks do;
     here they give NaN instead, which every simulation looks for.
