@@ -80,7 +80,7 @@ def diagnose(
     output: Output = None,
 ) -> None:
     """Find where the model and measured runs disagree, name the missing effect, and add it."""
-    command(diagnose_command)(arm, runs, json, output)
+    command(diagnose_command, fuse=True)(arm, runs, json, output)
 
 
 @app.command()

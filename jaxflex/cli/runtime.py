@@ -22,12 +22,12 @@ class UsageError(ValueError):
     """Bad input from the command line; the message says what is allowed."""
 
 
-def command(function: Callable) -> Callable:
-    """A command that prepares JAX and turns bad input into one line and exit status 2."""
+def command(function: Callable, fuse: bool = False) -> Callable:
+    """A command that prepares JAX (`fuse`: see `set_up`) and turns bad input into one line and exit status 2."""
 
     @wraps(function)
     def run(*args, **kwargs):
-        set_up()
+        set_up(fuse=fuse)
         try:
             return function(*args, **kwargs)
         except (ArmFileError, RecordingError, UsageError, SimulationError) as error:

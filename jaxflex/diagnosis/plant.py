@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from ..arm.arm import AssembledArm
 from ..drive import drive, drive_effects, effect_torques, has_current_state, joint_effects
-from ..dynamics.lagrange import accelerations
+from ..dynamics.lagrange import linearisable_accelerations
 from ..dynamics.simplify import simplified
 from ..effects import AbstractDryFriction, WindingHeating
 from ..scalars import Scalar
@@ -50,11 +50,12 @@ class Pieces(eqx.Module):
 
 
 class Response(NamedTuple):
-    """What pieces show, `(pieces, samples, channels)`, the state each ends in, and those on the way."""
+    """What pieces show, the state each ends in, those on the way, and the dry friction that acts there."""
 
-    reading: Float[Array, "*more samples channels"]
-    end: Float[Array, "*more states"]
-    states: Float[Array, "*more samples states"] | None = None
+    reading: Float[Array, "pieces samples channels"]
+    end: Float[Array, "pieces states"]
+    states: Float[Array, "pieces samples states"]
+    friction: Float[Array, "pieces samples joints"]
 
 
 def state_size(model: AssembledArm, channels: tuple[str, ...]) -> int:
@@ -90,7 +91,7 @@ def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tup
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
     total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(q), qd, strict=True))
-    return drives, accelerations(model, q, qd, total)
+    return drives, linearisable_accelerations(model, q, qd, total)
 
 
 @simplified
@@ -120,88 +121,74 @@ def truth(
     return tuple(found[name] for name in channels)
 
 
-def run_piece(
+def interval(
     model: AssembledArm,
-    instruments: Instruments,
     channels: tuple[str, ...],
-    start: Float[Array, " states"],
-    command: Float[Array, "samples joints"],
-    force: Float[Array, "samples coordinates"],
-    time: Float[Array, " samples"],
     sample_time: float,
     stepping: Stepping,
-) -> Response:
-    """One piece from `start`, by classical Runge-Kutta steps.
+    x: tuple,
+    friction: tuple,
+    command: tuple,
+    force: tuple,
+    t: Scalar,
+) -> tuple[tuple, tuple, tuple, tuple]:
+    """From one sample to the next by classical Runge-Kutta steps; `x` without the instruments.
 
-    `force`: on every coordinate beside all else, held over each interval.
+    `friction`: dry friction before; `force`: on every coordinate beside all else, held.
+
+    **Returns** the state, the dry friction, and what perfect instruments show at both ends.
     """
-    h = sample_time / stepping.substeps
-    some = instruments.lag > 0
-    safe = jnp.where(some, instruments.lag, 1.0)
-    decay = tuple(jnp.where(some, jnp.exp(-sample_time / safe), 0.0))
-    mean = tuple(jnp.where(some, 1 - jnp.exp(-sample_time / safe), 1.0) * instruments.lag / sample_time)
-    gain, bias, drift = (tuple(part) for part in instruments[:3])
-    count, joints = len(channels), len(model.joints)
+    h, joints = sample_time / stepping.substeps, len(model.joints)
 
     def moved(x, slope, by):
         return tuple(a + by * b for a, b in zip(x, slope, strict=True))
 
-    def step(carry, inputs):
-        x, friction = carry
-        u, f, t = inputs
-        before = truth(model, channels, t, x, u, friction)
-        shown = x[-count:]
-        reading = tuple(g * y + b + d * t for g, y, b, d in zip(gain, shown, bias, drift, strict=True))
+    def one_pass(y, dry):
+        total = (*(a + b for a, b in zip(force, dry, strict=False)), *force[joints:])
 
-        def one_pass(y, dry):
-            total = (*(a + b for a, b in zip(f, dry, strict=False)), *f[joints:])
+        def stage(carry, weights):
+            # classical Runge-Kutta as a scan over its stages, which compiles once for all four
+            z, slope, mean = carry
+            ahead, share = weights
+            slope = derivative(model, t + ahead * h, moved(z, slope, ahead * h), command, total)
+            return (z, slope, moved(mean, slope, share)), None
 
-            def stage(carry, weights):
-                # classical Runge-Kutta as a scan over its stages, which compiles once for all four
-                z, slope, mean = carry
-                ahead, share = weights
-                slope = derivative(model, t + ahead * h, moved(z, slope, ahead * h), u, total)
-                return (z, slope, moved(mean, slope, share)), None
+        zero = tuple(jnp.zeros_like(v) for v in y)
+        weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
+        (_, _, slope), _ = jax.lax.scan(stage, (y, zero, zero), weights)
+        return moved(y, slope, h)
 
-            zero = tuple(jnp.zeros_like(v) for v in y)
-            weights = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
-            (_, _, slope), _ = jax.lax.scan(stage, (y, zero, zero), weights)
-            return moved(y, slope, h)
+    none = (jnp.zeros_like(t),) * joints
 
-        def substep(_, carry):
-            y, _ = carry
+    def substep(_, carry):
+        y, _ = carry
 
-            def again(_, carry):
-                _, _, agreed = carry
-                end = one_pass(y, agreed)
-                starts, ends = (model.split(z[model.size : 2 * model.size])[0] for z in (y, end))
-                return end, agreed, dry_friction(model, stepping, starts, ends, agreed, h)
+        def again(_, carry):
+            _, _, agreed = carry
+            end = one_pass(y, agreed)
+            starts, ends = (model.split(z[model.size : 2 * model.size])[0] for z in (y, end))
+            return end, agreed, dry_friction(model, stepping, starts, ends, agreed, h)
 
-            none = (jnp.zeros_like(h),) * joints
-            end, dry, _ = jax.lax.fori_loop(0, stepping.passes, again, (y, none, none))
-            return end, dry
+        end, dry, _ = jax.lax.fori_loop(0, stepping.passes, again, (y, none, none))
+        return end, dry
 
-        y, friction = jax.lax.fori_loop(0, stepping.substeps, substep, (x, friction))
-        after = truth(model, channels, t + sample_time, y, u, friction)
-        lagged = tuple(
-            a * s + (m - a) * b + (1 - m) * c
-            for a, s, m, b, c in zip(decay, shown, mean, before, after, strict=True)
-        )
-        return ((*y[:-count], *lagged), friction), (reading, x)
-
-    inputs = (tuple(command.T), tuple(force.T), time)
-    still = (jnp.zeros_like(time[0]),) * joints
-    (end, _), (reading, states) = jax.lax.scan(step, (tuple(start), still), inputs)
-    return Response(jnp.stack(reading, -1), jnp.stack(end), jnp.stack(states, -1))
+    before = truth(model, channels, t, x, command, friction)
+    y, dry = jax.lax.fori_loop(0, stepping.substeps, substep, (x, none))
+    return y, dry, before, truth(model, channels, t + sample_time, y, command, dry)
 
 
-def _lanes(model, instruments, channels, starts, force, pieces: Pieces) -> Response:
-    def one(start, command, force, time):
-        return run_piece(
-            model, instruments, channels, start, command, force, time, pieces.sample_time, pieces.stepping
-        )
+class Lag(NamedTuple):
+    """How instruments follow: `decay shown + (mean - decay) before + (1 - mean) after`, a channel each."""
 
-    return jax.vmap(one)(starts, pieces.command, force, pieces.time)
+    decay: Float[Array, " channels"]
+    mean: Float[Array, " channels"]
+
+
+def lag(time: Float[Array, " channels"], sample_time: float) -> Lag:
+    """The instruments' step for lags of first order, exact for readings along a straight line."""
+    some = time > 0
+    left = jnp.where(some, jnp.exp(-sample_time / jnp.where(some, time, 1.0)), 0.0)
+    return Lag(left, (1 - left) * time / sample_time)
 
 
 @eqx.filter_jit
@@ -213,43 +200,95 @@ def respond(
     pieces: Pieces,
 ) -> Response:
     """Every piece from its own start."""
-    force = jnp.zeros((*pieces.time.shape, model.size))
-    return _lanes(model, instruments, channels, starts, force, pieces)
+    decay, mean = (tuple(part) for part in lag(instruments.lag, pieces.sample_time))
+    gain, bias, drift = (tuple(part) for part in instruments[:3])
+    count = len(channels)
+
+    def one(start, command, time):
+        none = (jnp.zeros_like(time[0]),) * model.size
+
+        def step(carry, inputs):
+            x, shown, friction = carry
+            u, t = inputs
+            reading = tuple(g * y + b + d * t for g, y, b, d in zip(gain, shown, bias, drift, strict=True))
+            y, dry, before, after = interval(
+                model, channels, pieces.sample_time, pieces.stepping, x, friction, u, none, t
+            )
+            lagged = tuple(
+                a * s + (m - a) * b + (1 - m) * c
+                for a, s, m, b, c in zip(decay, shown, mean, before, after, strict=True)
+            )
+            return (y, lagged, dry), (reading, (*x, *shown), friction)
+
+        still = none[: len(model.joints)]
+        (x, shown, _), found = jax.lax.scan(
+            step, (tuple(start)[:-count], tuple(start)[-count:], still), (tuple(command.T), time)
+        )
+        reading, states, friction = (jnp.stack(part, -1) for part in found)
+        return Response(reading, jnp.stack((*x, *shown)), states, friction)
+
+    return jax.vmap(one)(starts, pieces.command, pieces.time)
+
+
+class Moments(NamedTuple):
+    """Samples of a run, one after the other: the state there without the instruments, and what acts."""
+
+    x: Float[Array, "moments moving"]
+    friction: Float[Array, "moments joints"]
+    command: Float[Array, "moments joints"]
+    time: Float[Array, " moments"]
 
 
 class Direction(NamedTuple):
-    """What is moved: leaves of the model, instruments, starts, commands, forces."""
+    """What is moved, None for what is not: leaves of the model, states, dry friction, commands, forces."""
 
-    model: Any
-    instruments: Instruments
-    start: Float[Array, "*more states"]
-    command: Float[Array, "*more samples joints"]
-    force: Float[Array, "*more samples coordinates"]
+    model: Any = None
+    x: Float[Array, "directions moving"] | None = None
+    friction: Float[Array, "directions joints"] | None = None
+    command: Float[Array, "directions joints"] | None = None
+    force: Float[Array, "directions coordinates"] | None = None
+
+
+class Interval(NamedTuple):
+    """After an interval: the state, the dry friction, and what perfect instruments show at both ends."""
+
+    x: Float[Array, "*more moments moving"]
+    friction: Float[Array, "*more moments joints"]
+    before: Float[Array, "*more moments channels"]
+    after: Float[Array, "*more moments channels"]
 
 
 @eqx.filter_jit
-def slopes(
+def interval_slopes(
     model: AssembledArm,
-    instruments: Instruments,
     channels: tuple[str, ...],
-    starts: Float[Array, "pieces states"],
-    pieces: Pieces,
+    sample_time: float,
+    stepping: Stepping,
+    moments: Moments,
     directions: Direction,
-) -> Response:
-    """Derivative of `respond` along each of `directions`, leading axis first."""
+) -> tuple[Interval, Interval]:
+    """The intervals that begin at `moments`, and their derivatives along each of `directions`, leading axis first."""
     arrays, static = eqx.partition(model, eqx.is_inexact_array)
-    force = jnp.zeros((*pieces.time.shape, model.size))
 
-    def run(arrays, instruments, starts, command, force):
-        moved = eqx.tree_at(lambda p: p.command, pieces, command)
-        return _lanes(eqx.combine(arrays, static), instruments, channels, starts, force, moved)
+    def one(arrays, x, friction, command, force, t):
+        parts = (tuple(part) for part in (x, friction, command, force))
+        found = interval(eqx.combine(arrays, static), channels, sample_time, stepping, *parts, t)
+        return Interval(*(jnp.stack(part) for part in found))
 
-    point = (arrays, instruments, starts, pieces.command, force)
+    def run(arrays, x, friction, command, force):
+        over = (None, 0, 0, 0, None, 0)
+        return jax.vmap(one, over, 0)(arrays, x, friction, command, force, moments.time)
+
+    point = (arrays, moments.x, moments.friction, moments.command, jnp.zeros(model.size))
 
     def along(direction):
-        start = jnp.broadcast_to(direction.start, starts.shape)
-        tangent = (direction.model, direction.instruments, start, direction.command, direction.force)
-        moved = jax.jvp(run, point, tangent)[1]
-        return Response(moved.reading, moved.end)
+        many = tuple(
+            None if part is None else jnp.broadcast_to(part, at.shape)
+            for part, at in zip(direction[1:], point[1:], strict=True)
+        )
+        model = jax.tree.map(lambda _: None, arrays) if direction.model is None else direction.model
+        found, moved = eqx.filter_jvp(run, point, (model, *many))
+        pairs = zip(found, moved, strict=True)
+        return found, Interval(*(jnp.zeros_like(a) if b is None else b for a, b in pairs))
 
-    return jax.vmap(along)(directions)
+    return jax.vmap(along, out_axes=(None, 0))(directions)

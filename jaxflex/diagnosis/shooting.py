@@ -11,8 +11,6 @@ a whole run (Bock's direct multiple shooting).
 
 import dataclasses
 import itertools
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -24,13 +22,13 @@ from scipy.signal import lfilter
 from .delay import delayed
 from .normal import Normal, solve
 from .parameters import Parameters
-from .plant import Direction, Instruments, Pieces, Response, Stepping, respond, slopes
+from .plant import Instruments, Pieces, Response, Stepping, respond
+from .steps import LANES, Intervals, Point, Steps, along_pieces
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
 DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
-LANES = 10  # directions differentiated side by side: one compiled program whatever their number
 
 
 @dataclass(frozen=True)
@@ -52,6 +50,7 @@ class Run:
     valid: np.ndarray  # (pieces, samples)
     starts: np.ndarray  # (pieces, states)
     slopes: Slopes | None = None
+    point: Point | None = None
 
     @property
     def pieces(self) -> int:
@@ -104,6 +103,8 @@ class Problem:
                 1
             ]
 
+        effects = setting.parameters.effect
+        self._moves_model = [True] * len(setting.parameters.nominal) + [e.index is not None for e in effects]
         self._model = eqx.filter_jit(assembled)
         self._tangents = eqx.filter_jit(jax.vmap(along, (None, 0)))
         self._delay = [
@@ -167,12 +168,16 @@ class Problem:
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
-        pieces, _ = self.pieces(run, vector)
+        return self._respond(run, vector)[0]
+
+    def _respond(self, run: Run, vector: np.ndarray) -> tuple[Response, Pieces, np.ndarray]:
+        """What the pieces of a run show, the pieces, and the slope of their commands with delay."""
+        pieces, slope = self.pieces(run, vector)
         found = respond(
             self._model(jnp.asarray(vector)), self.instruments(vector), self.setting.channels,
             jnp.asarray(run.starts), pieces,
         )  # fmt: skip
-        return Response(*(np.asarray(part) for part in found))
+        return Response(*(np.asarray(part) for part in found)), pieces, slope
 
     def linearise(
         self,
@@ -192,7 +197,8 @@ class Problem:
         known = {} if old is None else old.by_column
         missing = [column for column in dict.fromkeys(columns) if column not in known]
         states = run.starts.shape[1]
-        reading, end = self._slopes(run, vector, old is None, missing, forcing)
+        motion = self._respond(run, vector)
+        reading, end = self._slopes(run, vector, motion, old is None, missing, forcing)
         if old is None:
             by_start, end_by_start = reading[..., :states], end[..., :states]
             reading, end = reading[..., states:], end[..., states:]
@@ -200,7 +206,7 @@ class Problem:
             by_start, end_by_start = old.by_start, old.end_by_start
         found = {column: (reading[..., k], end[..., k]) for k, column in enumerate(missing)}
         run.slopes = Slopes(by_start, end_by_start, known | found)
-        residual, gap = self._misfit(run, vector)
+        residual, gap = self._misfit(run, motion[0])
         by_column = [run.slopes.by_column[column] for column in columns]
         forced = range(len(missing), reading.shape[-1])
         return Linearised(
@@ -213,51 +219,76 @@ class Problem:
         )
 
     def _slopes(
-        self, run: Run, vector: np.ndarray, starts: bool, columns: list[int], forcing: np.ndarray | None
+        self,
+        run: Run,
+        vector: np.ndarray,
+        motion: tuple[Response, Pieces, np.ndarray],
+        starts: bool,
+        columns: list[int],
+        forcing: np.ndarray | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slopes of readings and ends by the starts, then by columns, then by forcing; last axis."""
-        s = self.setting
-        model, instruments = self._model(jnp.asarray(vector)), self.instruments(vector)
-        pieces, delay_slope = self.pieces(run, vector)
-        states, joints, size = run.starts.shape[1] if starts else 0, run.command.shape[1], model.size
-        more = 0 if forcing is None else len(forcing)
-        total = states + len(columns) + more
-        lanes = -(-total // LANES) * LANES
-        start = np.zeros((lanes, run.starts.shape[1]))
-        start[np.arange(states), np.arange(states)] = 1.0
-        unit = np.zeros((lanes, len(vector)))
-        command = np.zeros((lanes, run.pieces, s.length, joints))
-        force = np.zeros((lanes, run.pieces, s.length, size))
-        delays = {at: joint for joint, at in enumerate(self._delay) if at is not None}
-        for k, column in enumerate(columns):
-            unit[states + k, column] = 1.0
-            if column in delays:
-                command[states + k, :, :, delays[column]] = delay_slope[..., delays[column]]
-        if forcing is not None:
-            command[states + len(columns) : total] = forcing[..., :joints]
-            force[states + len(columns) : total] = forcing[..., joints:]
+        response, pieces, delay_slope = motion
+        states = run.starts.shape[1] if starts else 0
+        if forcing is None:
+            forcing = np.zeros((0, *pieces.time.shape, run.command.shape[1]))
+        total = states + len(columns) + len(forcing)
+        if total == 0:
+            return np.zeros((*run.reading.shape, 0)), np.zeros((*run.starts.shape, 0))
+        inside = [column for column in columns if self._moves_model[column]]
+        steps, tables = self._intervals(run, vector, response, pieces, inside)
+        start = np.eye(run.starts.shape[1], total) if starts else np.zeros((run.starts.shape[1], total))
+        unit = np.zeros((total, len(vector)))
+        unit[states + np.arange(len(columns)), columns] = 1.0
+        delays = [
+            (states + columns.index(at), joint) for joint, at in enumerate(self._delay) if at in columns
+        ]
+        places = [states + columns.index(column) for column in inside]
 
-        def some(first):
-            part = slice(first, first + LANES)
-            direction = Direction(
-                self._tangents(jnp.asarray(vector), jnp.asarray(unit[part])), self._instruments_along(unit[part]),
-                jnp.asarray(start[part, None, :]), jnp.asarray(command[part]), jnp.asarray(force[part]),
-            )  # fmt: skip
-            found = slopes(model, instruments, s.channels, jnp.asarray(run.starts), pieces, direction)
-            return np.asarray(found.reading), np.asarray(found.end)
+        def source(k):
+            added = np.zeros((run.pieces, steps.by_state.shape[2], total))
+            for place, column in zip(places, inside, strict=True):
+                added[..., place] = tables[column][:, k]
+            for place, joint in delays:
+                added[..., place] = steps.by_input[:, k, :, joint] * delay_slope[:, k, None, joint]
+            acting = np.moveaxis(forcing[:, :, k], 0, -1)
+            added[..., states + len(columns) :] = steps.by_input[:, k, :, : acting.shape[1]] @ acting
+            return added
 
-        if lanes == 0:
-            shape = run.reading.shape
-            return np.zeros((*shape, 0)), np.zeros((*run.starts.shape, 0))
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            readings, ends = zip(*pool.map(some, range(0, lanes, LANES)), strict=True)
-        reading = np.moveaxis(np.concatenate(readings)[:total], 0, -1) / s.noise[:, None]
-        end = np.moveaxis(np.concatenate(ends)[:total], 0, -1)
+        with np.errstate(all="ignore"):  # a piece may leave all bounds
+            reading, end = along_pieces(
+                steps,
+                response,
+                pieces,
+                self.instruments(vector),
+                start,
+                source,
+                self._instruments_along(unit),
+            )
+        reading = reading / self.setting.noise[:, None]
         return np.where(run.valid[..., None, None], reading, 0.0), end
 
-    def _misfit(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _intervals(
+        self, run: Run, vector: np.ndarray, response: Response, pieces: Pieces, columns: list[int]
+    ) -> tuple[Steps, dict[int, np.ndarray]]:
+        """The intervals of a run made linear, and their slopes by parameters of the arm."""
+        intervals = Intervals(self._model(jnp.asarray(vector)), self.setting.channels, pieces, response)
+        here = (vector, run.starts, run.command)
+        if run.point is None or not run.point.is_at(*here):
+            run.point = Point(*(part.copy() for part in here), intervals.steps(), {})
+        known = run.point.by_parameter
+        missing = [column for column in columns if column not in known]
+        groups = [missing[k : k + LANES] for k in range(0, len(missing), LANES)]
+        unit = np.zeros((len(groups), LANES, len(vector)))
+        for k, group in enumerate(groups):
+            unit[k, np.arange(len(group)), group] = 1.0
+        tangents = [self._tangents(jnp.asarray(vector), jnp.asarray(rows)) for rows in unit]
+        for group, table in zip(groups, intervals.by_parameters(tangents), strict=True):
+            known.update((column, table[..., k]) for k, column in enumerate(group))
+        return run.point.steps, known
+
+    def _misfit(self, run: Run, response: Response) -> tuple[np.ndarray, np.ndarray]:
         """Residual of every reading in units of the noise, and the gap after every piece."""
-        response = self.predict(run, vector)
         residual = (run.reading - response.reading) / self.setting.noise
         gap = np.zeros_like(run.starts)
         gap[:-1] = response.end[:-1] - run.starts[1:]
@@ -266,7 +297,7 @@ class Problem:
     def _instruments_along(self, unit: np.ndarray) -> Instruments:
         zero = self.instruments(np.zeros(unit.shape[1]))
         rows = [self.instruments(row) for row in unit]
-        return Instruments(*(np.stack([r[k] - zero[k] for r in rows]) for k in range(4)))
+        return Instruments(*(np.stack([r[k] - zero[k] for r in rows], -1) for k in range(4)))
 
     def condense(self, run: Run, linear: Linearised, horizon: int, damping: float = 0.0) -> Normal:
         """Least squares in the columns, over horizons of `horizon` pieces, starts eliminated.
@@ -327,7 +358,7 @@ class Problem:
 
     def refresh(self, run: Run, vector: np.ndarray, linear: Linearised) -> Linearised:
         """The same slopes about where the run is now."""
-        residual, gap = self._misfit(run, vector)
+        residual, gap = self._misfit(run, self.predict(run, vector))
         return dataclasses.replace(linear, residual=residual, gap=gap)
 
     def mend(self, run: Run, vector: np.ndarray) -> bool:

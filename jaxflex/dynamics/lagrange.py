@@ -18,7 +18,7 @@ from ..arm.arm import AssembledArm
 from ..arm.energy import kinetic_energy, potential_energy
 from ..scalars import Scalar
 from .ldl import solve
-from .simplify import simplified, traced
+from .simplify import cleaned, simplified, traced
 
 Coordinates = Float[Array, " coordinates"]
 Matrix = Float[Array, "coordinates coordinates"]
@@ -76,6 +76,15 @@ def inertia(model: AssembledArm, q: tuple) -> list[list[Scalar]]:
     return _along_each(lambda qd: momentum(model, q, qd), qd)
 
 
+def _momentum(model: AssembledArm, q: tuple, qd: tuple) -> tuple:
+    return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
+
+
+def _generalised_force(model: AssembledArm, q: tuple, qd: tuple) -> tuple:
+    """`dL/dq`."""
+    return jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
+
+
 @simplified
 def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
     """`q'' = M^-1 (force - bias)`, all tuples of scalars.
@@ -83,6 +92,10 @@ def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tup
     The bias `d/dt(dL/dq')|_{q''=0} - dL/dq` holds Coriolis, centrifugal, gravity and
     elastic terms; `force` everything else (damping, friction, motors, disturbances).
     """
+    return _accelerations(model, q, qd, force)
+
+
+def _accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
     energy = traced(kinetic_energy, model, q, qd)
     momentum = traced(jax.grad(energy, argnums=2), model, q, qd)
     lower = _along_each(lambda qd: momentum(model, q, qd), qd)
@@ -92,17 +105,44 @@ def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tup
     return solve(lower, right)
 
 
+@eqx.filter_custom_jvp
+def linearisable_accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
+    """The same, for those who want its slopes: `M dq'' = dforce - d(M q'' + bias)|_{q''}`.
+
+    Neither the inverse nor most of M is differentiated, which halves the work of a slope.
+    """
+    return accelerations(model, q, qd, force)
+
+
+@linearisable_accelerations.def_jvp
+def _accelerations_along(primals, tangents):
+    return _with_slope(primals, tangents)
+
+
+@simplified
+def _with_slope(primals, tangents):
+    model, q, qd, force = primals
+    qdd = _accelerations(model, q, qd, force)
+    still = (None,) * len(qdd)
+    _, moved = eqx.filter_jvp(cleaned(_inertial), (model, q, qd, qdd), (*tangents[:3], still))
+    right = tuple(
+        (jnp.zeros_like(a) if f is None else f) - (0.0 if m is None else m)
+        for a, f, m in zip(qdd, tangents[3], moved, strict=True)
+    )
+    return qdd, solve(_along_each(lambda qd: _momentum(model, q, qd), qd), right)
+
+
+def _inertial(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tuple[Scalar, ...]:
+    """`d/dt(dL/dq') - dL/dq` under the accelerations `qdd`."""
+    change = jax.jvp(lambda q, qd: _momentum(model, q, qd), (q, qd), (qd, qdd))[1]
+    return tuple(c - s for c, s in zip(change, _generalised_force(model, q, qd), strict=True))
+
+
 def inverse_dynamics(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tuple[Scalar, ...]:
     """`M q'' + C q' + g + D q'`: the force on every coordinate that makes this motion.
 
     [N m] on the joints, [N] on the deflections, where a motion that is possible without
     other forces has none. From the Lagrangian: `d/dt(dL/dq') - dL/dq + D q'`.
     """
-
-    def momentum(q, qd):
-        return jax.grad(kinetic_energy, argnums=2)(model, q, qd)
-
-    slope = jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
-    change = jax.jvp(momentum, (q, qd), (qd, qdd))[1]
     damped = map(lambda d, v: d * v, model.damping(), qd)
-    return tuple(c - s + d for c, s, d in zip(change, slope, damped, strict=True))
+    return tuple(f + d for f, d in zip(_inertial(model, q, qd, qdd), damped, strict=True))

@@ -21,8 +21,12 @@ from jax.extend import core
 
 def simplified(function: Callable) -> Callable:
     """`function` of pytrees of arrays, its program traced, cleaned and cached."""
+    return eqx.filter_jit(cleaned(function))
 
-    @eqx.filter_jit
+
+def cleaned(function: Callable) -> Callable:
+    """The same as a part of a larger program, which can be cleaned as one."""
+
     @wraps(function)
     def call(*args):
         return traced(function, *args)(*args)

@@ -1,3 +1,4 @@
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -6,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxflex as jf
-from jaxflex.dynamics.lagrange import accelerations, damping_vector
+from jaxflex.dynamics.lagrange import accelerations, damping_vector, linearisable_accelerations
 
 
 def three_links():
@@ -57,6 +58,24 @@ def test_scalar_accelerations_agree_with_the_matrices(model):
     expected = jnp.linalg.solve(mass, force - coriolis @ qd - jf.gravity_vector(model, q))
     found = jnp.stack(accelerations(model, tuple(q), tuple(qd), tuple(force)))
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("by_model", [True, False])
+def test_linearisable_accelerations_have_the_slopes_of_the_others(by_model):
+    model = jf.foldager_link(0.02).assemble()
+    q, qd = (tuple(part) for part in state(model, 4))
+    arrays, static = eqx.partition(model, eqx.is_inexact_array)
+
+    def along(function):
+        def run(arrays, q, qd, force):
+            return jnp.stack(function(eqx.combine(arrays, static), q, qd, force))
+
+        still = jax.tree.map(lambda _: None, arrays)
+        moved = jax.tree.map(lambda a: 0.01 * a, arrays) if by_model else still
+        return eqx.filter_jvp(run, (arrays, q, qd, q), (moved, qd, q, qd))[1]
+
+    found, expected = along(linearisable_accelerations), along(accelerations)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_energy_does_not_depend_on_where_the_base_points(model):
