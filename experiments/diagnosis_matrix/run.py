@@ -141,7 +141,7 @@ def main() -> None:
     parser.add_argument("--share", default="0/1", help="k/n: every n-th case, from the k-th")
     parser.add_argument("--only", default="", help="cases whose name contains this")
     given = parser.parse_args()
-    jf.set_up()
+    jf.set_up(fuse=True)
     given.o.mkdir(parents=True, exist_ok=True)
     part, of = map(int, given.share.split("/"))
     folders = sorted(p.parent for p in given.cases.glob("*/arm.toml") if given.only in p.parent.name)

@@ -67,9 +67,9 @@ def _foretells(prepared: Prepared, outcome: Outcome) -> float:
 
 
 def departure(search: Search, hypothesis: Hypothesis) -> float:
-    """How far the nominal parameters went, root mean square, in their stated standard deviations."""
-    count = len(search.parameters.nominal)
-    return float(np.sqrt(np.mean(hypothesis.fit.vector[:count] ** 2)))
+    """How far the nominal parameters went: root mean square, or half the farthest, in standard deviations."""
+    moved = np.abs(hypothesis.fit.vector[: len(search.parameters.nominal)])
+    return float(max(np.sqrt(np.mean(moved**2)), 0.5 * moved.max(initial=0.0)))
 
 
 def find(search: Search, start: Hypothesis | None = None) -> Outcome:
