@@ -16,7 +16,7 @@ from ..files.units import parameter_unit
 from ..sensors import unit
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
+from .hypothesis import BENT, CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
 from .locate import LatentForce, regimes
 from .next_experiment import advice
 from .prepare import Prepared
@@ -51,7 +51,8 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
     for place, rival in outcome.rivals:
         candidate = rival.effects[-1]
         alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
-    verdict = _verdict(outcome, levels, gone)
+    bent = search.departure(final) > BENT
+    verdict = "unexplained" if bent else _verdict(outcome, levels, gone)
     vector = final.fit.vector
     arm = parameters.build(jnp.asarray(vector))
     improved = _with_outside(file, search, arm, outcome.final.effects, vector)
@@ -69,7 +70,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
         calibrated={part.name: estimates[i] for i, part in enumerate(parameters.nominal)},
         improved=improved,
         explained=float(np.clip(gone, 0.0, 1.0)),
-        notes=prepared.notes,
+        notes=(*prepared.notes, *([_bent(search, final)] if bent else [])),
         seconds=time.perf_counter() - began,
         forces_before=tuple(forces_before),
         forces_after=tuple(forces_after),
@@ -135,6 +136,16 @@ def _verdict(outcome: Outcome, levels: list[float], gone: float) -> str:
     if levels[1] > AT_FLOOR and gone < MOSTLY:
         return "unexplained"
     return "ambiguous" if outcome.rivals else "missing_effect"
+
+
+def _bent(search: Search, final: Hypothesis) -> str:
+    nominal = search.parameters.nominal
+    moved = final.fit.vector[: len(nominal)]
+    worst = ", ".join(f"{nominal[i].name} {moved[i]:+.1f}" for i in np.argsort(-np.abs(moved))[:3])
+    return (
+        f"the arm's own parameters had to leave their stated uncertainty to fit ({worst} standard deviations): "
+        "what is missing is not what was named, or the uncertainty is larger than stated"
+    )
 
 
 def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:

@@ -10,7 +10,7 @@ from ..effects import EFFECTS, SensorGain
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .describe import describe, judge, level
-from .hypothesis import CLOSE, HORIZONS, PARTS, Hypothesis, Outcome, Ranked, Search, Starts, without
+from .hypothesis import BENT, CLOSE, HORIZONS, PARTS, Hypothesis, Outcome, Ranked, Search, Starts, without
 from .loose_joint import loose_joints
 from .prepare import Prepared, make_problem
 from .result import Diagnosis
@@ -20,11 +20,12 @@ STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain wo
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 FAIR = 1.5  # misfit a reading over a second, in units of the noise, that leaves nothing to explain
-BENT = 2.0  # departure of the nominal parameters, in standard deviations, that speaks of something missing
 LITTLE = 0.01  # of the gap there was: what may be left over a second where a tenth of one is followed
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
+FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
+HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 
 
@@ -49,7 +50,8 @@ def diagnose(
     prepared = make_problem(file, recordings)
     search = Search(prepared.problem, prepared.calibration, say)
     outcome = find(search)
-    if outcome.level > FAIR or departure(search, outcome.final) > BENT:
+    much = outcome.level > FAIR and outcome.level - 1 > LITTLE * (outcome.nominal_level - 1)
+    if much or search.departure(outcome.final) > BENT:
         say("what is left may lie between a motor and its link")
         for loose, other, start in loose_joints(file, recordings, say):
             found = find(other, start)
@@ -64,12 +66,6 @@ def diagnose(
 def _foretells(prepared: Prepared, outcome: Outcome) -> float:
     """Misfit a reading over runs that nothing was fitted to, in units of the noise."""
     return level(prepared.problem, judge(prepared.problem, prepared.held_out, outcome.final)[0])
-
-
-def departure(search: Search, hypothesis: Hypothesis) -> float:
-    """How far the nominal parameters went: root mean square, or half the farthest, in standard deviations."""
-    moved = np.abs(hypothesis.fit.vector[: len(search.parameters.nominal)])
-    return float(max(np.sqrt(np.mean(moved**2)), 0.5 * moved.max(initial=0.0)))
 
 
 def find(search: Search, start: Hypothesis | None = None) -> Outcome:
@@ -94,7 +90,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             outcome = Outcome(fitted, starts)
         outcome.final, outcome.final_starts = fitted, starts
         levels.append(search.over_a_second(fitted))
-        outcome.level = levels[-1]
+        outcome.nominal_level, outcome.level = levels[0], levels[-1]
         if start is not None and not fitted.effects:
             base, base_starts = start, begin
             continue
@@ -113,7 +109,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             search.restart(base_starts)
             ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
         tried = _short_list(ranked)
-        bent = start is None and departure(search, fitted) > BENT
+        bent = start is None and search.departure(fitted) > BENT
         if len(fitted.effects) == MOST_EFFECTS or not (tried or bent):
             break
         before, before_starts = (base, base_starts) if far else (fitted, starts)
@@ -127,7 +123,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
                     confirmed.append((found.strength(fitted, explained), found, search.starts()))
 
         confirm(tried, before, before_starts)
-        if bent and not (confirmed and decisive(search, simplest(confirmed)[1])):
+        if bent and not (confirmed and decisive(search, fitted, simplest(confirmed)[1])):
             search.restart(base_starts)
             straight, straight_starts = straightened(search, base)
             parts = sift(search, straight, straight_starts, search.parts(straight.effects))
@@ -144,11 +140,16 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
     return outcome
 
 
-def decisive(search: Search, best: Hypothesis) -> bool:
-    """True if nothing is left, and no part of the arm could be meant by what was named."""
-    kind = EFFECTS[best.effects[-1].effect]
-    imitated = issubclass(kind, (*PARTS, SensorGain))
-    return best.fit.level < FAIR and departure(search, best) < BENT and not imitated
+def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
+    """True if no part of the arm need be tried beside what was found best.
+
+    Either nothing is left; or much is, which bends all parameters, and most of it has gone.
+    """
+    if issubclass(EFFECTS[best.effects[-1].effect], (*PARTS, SensorGain)):
+        return False  # a part of the arm could be meant
+    if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
+        return True
+    return best.fit.level < FAIR and search.departure(best) < BENT
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:

@@ -24,6 +24,7 @@ TRUSTED = 2.5  # standard deviations up to which a nominal parameter may leave i
 CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
+BENT = 2.0  # departure of the nominal parameters that speaks of something missing
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
@@ -193,6 +194,16 @@ class Search:
         self.restart(starts)
         return level
 
+    def departure(self, hypothesis: Hypothesis) -> float:
+        """How far the nominal parameters went, root mean square, in standard deviations.
+
+        Where nothing else is left, half of what the farthest of them went counts too: one among
+        many may have made up for what is missing.
+        """
+        moved = np.abs(hypothesis.fit.vector[: len(self.parameters.nominal)])
+        farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
+        return float(max(np.sqrt(np.mean(moved**2)), 0.5 * farthest))
+
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
         return latent_forces(self.problem, self.runs[0], vector, horizon)
@@ -312,5 +323,6 @@ class Outcome:
         self.final = nominal
         self.final_starts = starts
         self.level = np.inf  # misfit a reading over the longest horizon
+        self.nominal_level = np.inf  # the same without any effect
         self.rivals: list[tuple[int, Hypothesis]] = []
         self.gains: list[float] = []
