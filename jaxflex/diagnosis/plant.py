@@ -271,8 +271,9 @@ def interval_slopes(
     arrays, static = eqx.partition(model, eqx.is_inexact_array)
 
     def one(arrays, x, friction, command, force, t):
-        parts = (tuple(part) for part in (x, friction, command, force))
-        found = interval(eqx.combine(arrays, static), channels, sample_time, stepping, *parts, t)
+        x, friction, command, force = (tuple(part) for part in (x, friction, command, force))
+        moved = eqx.combine(arrays, static)
+        found = interval(moved, channels, sample_time, stepping, x, friction, command, force, t)
         return Interval(*(jnp.stack(part) for part in found))
 
     def run(arrays, x, friction, command, force):

@@ -275,7 +275,8 @@ class Problem:
         intervals = Intervals(self._model(jnp.asarray(vector)), self.setting.channels, pieces, response)
         here = (vector, run.starts, run.command)
         if run.point is None or not run.point.is_at(*here):
-            run.point = Point(*(part.copy() for part in here), intervals.steps(), {})
+            copies = [part.copy() for part in here]
+            run.point = Point(copies[0], copies[1], copies[2], intervals.steps(), {})
         known = run.point.by_parameter
         missing = [column for column in columns if column not in known]
         groups = [missing[k : k + LANES] for k in range(0, len(missing), LANES)]
