@@ -200,7 +200,9 @@ class Search:
         Where nothing else is left, half of what the farthest of them went counts too: one among
         many may have made up for what is missing.
         """
-        moved = np.abs(hypothesis.fit.vector[: len(self.parameters.nominal)])
+        nominal = self.parameters.nominal
+        stated = [i for i, part in enumerate(nominal) if not part.is_of_contact]
+        moved = np.abs(hypothesis.fit.vector[stated])
         farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
         return float(max(np.sqrt(np.mean(moved**2)), 0.5 * farthest))
 

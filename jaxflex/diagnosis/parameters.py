@@ -22,6 +22,7 @@ from ..files.arm_file import ArmFile
 # what these do is done to the command and to the readings, not inside the arm
 OUTSIDE = (InputDelay, AbstractSensorEffect)
 
+CONTACT = ("contact_stiffness", "contact_damping", "motor_share")
 DEFAULT_UNCERTAINTY = 0.05  # relative, where an arm file says nothing
 
 
@@ -36,6 +37,11 @@ class Nominal:
     value: float
     spread: float
     leaves: tuple[tuple[Callable[[Any], Any], int], ...]
+
+    @property
+    def is_of_contact(self) -> bool:
+        """True of what happens between the flanks of a loose joint: nobody states it, a guess stands for it."""
+        return self.name.startswith(CONTACT)
 
 
 @dataclass(frozen=True)
@@ -169,7 +175,7 @@ def _nominal(file: ArmFile) -> list[Nominal]:
         tail = f"_{i + 1}" if len(arm.joints) > 1 else ""
         fields = ["hub_inertia", "hub_mass", "viscous_friction", "rotor_inertia"]
         if joint.play is not None:
-            fields += ["contact_stiffness", "contact_damping", "motor_share"]
+            fields += CONTACT
         for field in fields:
             if field == "hub_mass" and i == 0:
                 continue  # carried by the base
