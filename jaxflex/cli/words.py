@@ -18,8 +18,8 @@ MEANING = {
     "explains these recordings as well as the others do. The improved model holds the first; another "
     "experiment has to tell them apart.",
     "unexplained": "Unexplained means: the model and the data disagree by more than the noise, for "
-    "certain, and no effect in the catalogue, nor several together, makes up for it, unless the arm's own "
-    "parameters leave their stated uncertainty by far. What is known of the "
+    "certain, and no effect in the catalogue, nor several together, makes up for it, unless parameters of "
+    "the arm itself leave their stated uncertainty by far. What is known of the "
     "disagreement is where it is and what it goes with. Do not trust the improved model beyond these "
     "recordings.",
 }

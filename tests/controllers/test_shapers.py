@@ -186,7 +186,8 @@ def test_sampled_shapers_cancel_on_their_samples(sample_time, zeta):
             np.testing.assert_allclose(residual_ratio(filtered, f[k], zetas[k]), 0.0, atol=1e-11)
         np.testing.assert_allclose(filtered.amplitudes.sum(), 1.0, rtol=1e-12)
     rounded = Shaper(shaper.amplitudes, sample_time * jnp.round(shaper.delays / sample_time))
-    assert residual_ratio(rounded, 2.0, zeta) > residual_ratio(filtered, 2.0, zeta)
+    # no better, and equal where every delay is on a sample as it is
+    assert residual_ratio(rounded, 2.0, zeta) > residual_ratio(filtered, 2.0, zeta) - 1e-12
 
 
 def test_closed_form_residual_is_that_of_an_oscillator():

@@ -1,4 +1,4 @@
-from experiments.diagnosis_matrix.run import right, summary, wilson
+from experiments.diagnosis_matrix.run import met, right, summary, wilson
 
 
 def test_what_counts_as_right():
@@ -22,6 +22,11 @@ def test_rates_come_with_their_interval():
     line = {
         "case": "x", "hidden": ["gravity"], "gap": 3.0, "verdict": "missing_effect", "named": ["gravity"],
         "alternatives": [], "after_over_floor": 1.0, "seconds": 20.0, "right": True,
+        "parameters": {"gravity": {"along_y": [1.04, 0.01]}},
+        "truth": [{"name": "gravity", "location": "base", "values": {"along_y": 1.0}}],
     }  # fmt: skip
-    text = summary([line, line | {"hidden": [], "gap": None, "right": False}])
+    nothing = {"hidden": [], "gap": None, "right": False, "named": [], "parameters": {}, "truth": []}
+    text = summary([line, line | nothing])
+    assert met(line) and not met(line | {"parameters": {"gravity": {"along_y": [1.06, 0.01]}}})
+    assert met(line | {"parameters": {"gravity": {"along_y": [1.06, 0.04]}}}) and met(line | nothing) is None
     assert "| one effect, gap 3 | 1 | 1 | 100% |" in text and "| nothing hidden | 1 | 0 | 0% |" in text

@@ -181,7 +181,8 @@ def test_which_modes_are_found_depends_on_what_counts_as_the_input(loop):
         assert all(m.frequency < 70 for m in found.modes)
         near = [min(found.modes, key=lambda m, f=f: abs(m.frequency - f)) for f, _ in truth]
         np.testing.assert_allclose([m.frequency for m in near], truth[:, 0], rtol=0.01, err_msg=kind)
-        np.testing.assert_allclose(near[0].damping_ratio, truth[0, 1], rtol=0.03, err_msg=kind)
+        off = abs(near[0].damping_ratio - truth[0, 1])
+        assert off < 0.03 * truth[0, 1] + 2 * near[0].damping_std, kind
         assert any("Record reference_1" in w for w in found.warnings) == (kind != "reference")
     unnamed = jf.Recording(log.times, {k: v for k, v in log.channels.items() if k != "reference_1"})
     assert any("moved by its drive (voltage)" in w for w in jf.measure_modes([unnamed]).warnings)
