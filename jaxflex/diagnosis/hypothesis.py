@@ -25,6 +25,7 @@ CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and 
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
 BENT = 2.0  # departure of the nominal parameters that speaks of something missing
+FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
@@ -197,14 +198,14 @@ class Search:
     def departure(self, hypothesis: Hypothesis) -> float:
         """How far the nominal parameters went, root mean square, in standard deviations.
 
-        Where nothing else is left, half of what the farthest of them went counts too: one among
+        Where nothing else is left, a share of what the farthest of them went counts too: one among
         many may have made up for what is missing.
         """
         nominal = self.parameters.nominal
         stated = [i for i, part in enumerate(nominal) if not part.is_of_contact]
         moved = np.abs(hypothesis.fit.vector[stated])
         farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
-        return float(max(np.sqrt(np.mean(moved**2)), 0.5 * farthest))
+        return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
