@@ -93,6 +93,6 @@ def plot_gradients(found: dict) -> Figure:
     for mode, colour in (("forward", OURS), ("reverse", MEASURED)):
         axis.loglog(counts, [row[f"{mode} / cost"] for row in rows], "o-", color=colour, label=mode)
     axis.set_xlabel("parameters")
-    axis.set_ylabel("seconds of the gradient over those of the cost")
+    axis.set_ylabel("time of gradient over time of cost")
     axis.legend(fontsize=8)
     return made
