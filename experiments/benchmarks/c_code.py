@@ -188,6 +188,15 @@ def operations(e: Equations) -> Operations:
     return Operations(first, shared, mass, out[len(below) :], angle.xreplace(renamed), max(1, len(once)))
 
 
+def joint_feedback(end: str = "") -> list[str]:
+    """The PD law, a line a joint, in C (with `end=";"`) or Python."""
+    return [
+        f"    f[{i}] = {float(GAINS.stiffness[i])!r} * ({STOP[i]!r} * share - q[{i}])"
+        f" + {float(GAINS.damping[i])!r} * ({STOP[i]!r} * rate - v[{i}]){end}"
+        for i in range(len(STOP))
+    ]
+
+
 def source(e: Equations) -> str:
     """The C program."""
     found, printed = operations(e), _Printer().doprint
@@ -199,11 +208,7 @@ def source(e: Equations) -> str:
     body.append("    real m[N][N], l[N][N], inv[N];")
     body += [f"    m[{i}][{j}] = {printed(x)} + 0 * y[0];" for (i, j), x in found.mass.items()]
     body += [f"    f[{i}] -= {printed(x)};" for i, x in enumerate(found.bias)]
-    command = [
-        f"    f[{i}] = {float(GAINS.stiffness[i])!r} * ({STOP[i]!r} * share - q[{i}])"
-        f" + {float(GAINS.damping[i])!r} * ({STOP[i]!r} * rate - v[{i}]);"
-        for i in range(len(STOP))
-    ]
+    command = joint_feedback(";")
     return HEAD % {
         "n": len(e.q), "parameters": len(e.symbols), "constants": found.constants,
         "once": "\n".join(first), "move": MOVE_TIME, "command": "\n".join(command),

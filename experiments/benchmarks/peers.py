@@ -16,7 +16,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 import jaxflex as jf
 
-from .c_code import operations
+from .c_code import joint_feedback, operations
 from .equations import Equations
 from .problem import DURATION, GAINS, MOVE_TIME, STOP, Sweep
 from .timing import best_of
@@ -105,11 +105,7 @@ def compiled_python(e: Equations) -> dict[str, Any]:
     body = [f"{s} = {printed(x)}" for s, x in found.shared]
     body += [f"m[{i}, {j}] = {printed(x)}" for (i, j), x in found.mass.items()]
     body += [f"f[{i}] -= {printed(x)}" for i, x in enumerate(found.bias)]
-    command = [
-        f"    f[{i}] = {float(GAINS.stiffness[i])!r} * ({STOP[i]!r} * share - q[{i}])"
-        f" + {float(GAINS.damping[i])!r} * ({STOP[i]!r} * rate - v[{i}])"
-        for i in range(len(STOP))
-    ]
+    command = joint_feedback()
     text = NUMBA.format(
         n=len(e.q), n2=2 * len(e.q), constants=found.constants, move=MOVE_TIME,
         angle=printed(found.angle), command="\n".join(command),

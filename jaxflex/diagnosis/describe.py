@@ -139,9 +139,8 @@ def _verdict(outcome: Outcome, levels: list[float], gone: float) -> str:
 
 
 def _bent(search: Search, final: Hypothesis) -> str:
-    nominal = search.parameters.nominal
-    moved = final.fit.vector[: len(nominal)]
-    worst = ", ".join(f"{nominal[i].name} {moved[i]:+.1f}" for i in np.argsort(-np.abs(moved))[:3])
+    farthest = sorted(search.departures(final).items(), key=lambda item: -abs(item[1]))[:3]
+    worst = ", ".join(f"{name} {moved:+.1f}" for name, moved in farthest)
     return (
         f"the arm's own parameters had to leave their stated uncertainty to fit ({worst} standard deviations): "
         "what is missing is not what was named, or the uncertainty is larger than stated"

@@ -195,15 +195,21 @@ class Search:
         self.restart(starts)
         return level
 
+    def departures(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """How far each stated parameter of the arm went, in standard deviations."""
+        return {
+            part.name: float(hypothesis.fit.vector[i])
+            for i, part in enumerate(self.parameters.nominal)
+            if not part.is_of_contact
+        }
+
     def departure(self, hypothesis: Hypothesis) -> float:
         """How far the nominal parameters went, root mean square, in standard deviations.
 
         Where nothing else is left, a share of what the farthest of them went counts too: one among
         many may have made up for what is missing.
         """
-        nominal = self.parameters.nominal
-        stated = [i for i, part in enumerate(nominal) if not part.is_of_contact]
-        moved = np.abs(hypothesis.fit.vector[stated])
+        moved = np.abs(list(self.departures(hypothesis).values()))
         farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
         return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 

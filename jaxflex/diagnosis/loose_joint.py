@@ -20,7 +20,7 @@ from .parameters import Parameters
 from .prepare import Prepared, make_problem
 from .shooting import Run
 
-CONTACT = {  # value, and relative uncertainty
+GUESSES = {  # of CONTACT: value, and relative uncertainty
     "contact_stiffness": (100.0, 0.5),  # N m/rad
     "contact_damping": (0.03, 1.0),  # N m s/rad
     "motor_share": (0.6, 0.3),
@@ -32,11 +32,11 @@ FITTED = 3  # of the trials, those that fit best as they are
 
 def loosened(file: ArmFile, joint: int) -> ArmFile:
     """The arm with motor and link of a joint apart, tied by a stiff spring."""
-    values = {name: value for name, (value, _) in CONTACT.items()}
+    values = {name: value for name, (value, _) in GUESSES.items()}
     joints = list(file.arm.joints)
     joints[joint] = dataclasses.replace(joints[joint], play=0.0, **values)
     arm = dataclasses.replace(file.arm, joints=tuple(joints))
-    spread = {name: spread for name, (_, spread) in CONTACT.items()}
+    spread = {name: spread for name, (_, spread) in GUESSES.items()}
     return dataclasses.replace(file, arm=arm, uncertainty=file.uncertainty | spread)
 
 
@@ -89,11 +89,9 @@ def loose_joints(
 def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
     """Leave to move the contact alone, with the rest of the arm as it is."""
     free = freedom(parameters, (candidate,))
-    names = parameters.names
+    nominal = parameters.nominal
     own = [
-        k
-        for k, column in enumerate(free.columns)
-        if column >= len(parameters.nominal) or names[column].rstrip("_0123456789") in CONTACT
+        k for k, column in enumerate(free.columns) if column >= len(nominal) or nominal[column].is_of_contact
     ]
     return Freedom(
         tuple(free.columns[k] for k in own),
