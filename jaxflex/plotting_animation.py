@@ -115,7 +115,11 @@ def _deflections(
     """
     link, constants, joint = model.arm.links[i], model.links[i], model.joints[i]
     if link.modes == 0:
-        return jnp.zeros((_POINTS, 0))
+        return (
+            along[:, None] * jnp.stack(constants.tip_deflection)
+            if constants.loose
+            else jnp.zeros((_POINTS, 0))
+        )
     tip, slope = jnp.stack(constants.tip_deflection), link.length * jnp.stack(constants.tip_slope)
     if not isinstance(link, Link) or link.model == "lumped":
         u = along[:, None]

@@ -161,7 +161,7 @@ class Arm(eqx.Module):
             if i < len(arm.links):
                 models.append(arm.links[i].discretise(arm.distal(i), i + 1 < len(arm.links), joint))
             else:
-                models.append(rigid_link(scalar(0.0), scalar(0.0)))
+                models.append(rigid_link(scalar(0.0), scalar(0.0), joint.play is not None))
         return AssembledArm(arm, tuple(models))
 
 

@@ -148,8 +148,12 @@ class Link(AbstractLink):
     def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         """The constants of the link, its shapes chosen for what hangs on it."""
         if self.modes == 0:
-            return rigid_link(self.length, self.mass)
+            return rigid_link(self.length, self.mass, joint.play is not None)
         if self.model == "lumped":
+            if joint.play is not None:
+                raise ValueError(
+                    "a lumped link has no play at its root: use model = 'assumed_modes', or no play."
+                )
             return lumped_link(
                 self.length, self.mass_per_length, self.flexural_rigidity,
                 self.damping_ratio, self.gauge_position, self.segments, None, distal.mass,

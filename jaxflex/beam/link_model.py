@@ -81,12 +81,20 @@ def symmetric_form(rows: tuple[tuple[Scalar, ...], ...], a: tuple) -> Scalar | f
     return total
 
 
-def rigid_link(length: Scalar, mass: Scalar) -> LinkModel:
-    """A uniform link that does not bend (the limit of rising stiffness)."""
+def rigid_link(length: Scalar, mass: Scalar, loose: bool = False) -> LinkModel:
+    """A uniform link that does not bend (the limit of rising stiffness).
+
+    A `loose` one has a single shape, its rotation in the play of the joint; of no length and
+    mass it is what a motor axis drives.
+    """
+    first, second = mass * length / 2, mass * length**2 / 3
     none: tuple[Scalar, ...] = ()
+    if not loose:
+        return LinkModel(length, mass, first, second, none, none, (), none, none, none, none, none)
+    zero, one = (jnp.zeros_like(length),), (jnp.ones_like(length),)
     return LinkModel(
-        length, mass, mass * length / 2, mass * length**2 / 3,
-        none, none, (), none, none, none, none, none,
+        length, mass, first, second, (first,), (second,), ((second,),), zero, zero, (length,), one, zero, one,
+        loose=True,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ that the model predicts; all others are slopes by a parameter of the arm.
 # arrays of numpy go to JAX and come back, which its annotations do not foresee
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import jax
@@ -25,7 +25,7 @@ from .shooting import Problem, Run
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.5  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
-SATURATION = (0.4, 0.55, 0.7, 0.85)  # of the largest command
+SATURATION = (0.4, 0.55, 0.7, 0.8, 0.88, 0.95)  # of the largest command
 COOLING = (0.0, 10.0)  # s
 
 
@@ -101,42 +101,45 @@ def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> 
         return arm.links[int(location.rpartition("_")[2]) - 1].modes > 0
     if name == "joint_flexibility":
         joint = int(location.rpartition("_")[2]) - 1
-        return joint < len(arm.links) and arm.links[joint].modes > 0
+        bends = joint < len(arm.links) and arm.links[joint].modes > 0
+        return bends or arm.joints[joint].play is not None
     if name.startswith("sensor_"):
         return location in channels
     return True
 
 
-def candidates(parameters: Parameters, motion: "Motion", frequencies: list[float]) -> Iterator[Candidate]:
-    """Every candidate for a motion; `frequencies` [Hz] are those worth trying for a disturbance."""
+def candidates(
+    parameters: Parameters, motions: "Sequence[Motion]", frequencies: list[float]
+) -> Iterator[Candidate]:
+    """Every candidate for these motions; `frequencies` [Hz] are those worth trying for a disturbance."""
     for effect in parameters.effects:
         name, location = effect.name, effect.location
         if name == "stribeck_friction":
             for share in STRIBECK:
-                rate = share * motion.rms_rate(effect.index)
+                rate = share * max(motion.rms_rate(effect.index) for motion in motions)
                 shape = (("stribeck_rate", rate), ("transition_rate", float(effect.transition_rate)))
                 yield Candidate(
                     name, location, ("torque", "level"), shape, ("stribeck_rate", "transition_rate")
                 )
         elif name == "cogging_torque":
             for order in ORDERS:
-                if order * motion.range(effect.index) < WAVES * 2 * np.pi:
+                if order * max(motion.range(effect.index) for motion in motions) < WAVES * 2 * np.pi:
                     continue  # too little of a wave to tell it from any other curve
                 yield Candidate(name, location, ("sine", "cosine"), (("order", float(order)),))
         elif name == "periodic_disturbance":
             for f in frequencies:
                 yield Candidate(name, location, ("sine", "cosine"), (("frequency", f),), ("frequency",))
         elif name == "voltage_saturation":
+            largest = max(motion.largest_command(effect.index) for motion in motions)
             for share in SATURATION:
-                yield Candidate(
-                    name, location, (), (("limit", share * motion.largest_command(effect.index)),), ("limit",)
-                )
+                yield Candidate(name, location, (), (("limit", share * largest),), ("limit",))
         elif name == "torque_constant":
             for share in (0.0, 1.0):
                 yield Candidate(name, location, ("change",), (("back_emf_share", share),))
         elif name == "winding_heating":
             for time in COOLING:
-                yield Candidate(name, location, ("coefficient",), (("cooling_time", time),))
+                free = ("cooling_time",) if time else ()
+                yield Candidate(name, location, ("coefficient",), (("cooling_time", time),), free)
         elif name == "gravity":
             yield Candidate(name, location, ("along_y", "along_x"))
         elif name == "cable_stiffness":

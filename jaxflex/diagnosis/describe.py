@@ -5,6 +5,7 @@
 
 import dataclasses
 import time
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,7 +17,7 @@ from ..files.units import parameter_unit
 from ..sensors import unit
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
-from .hypothesis import BENT, CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
 from .locate import LatentForce, regimes
 from .next_experiment import advice
 from .prepare import Prepared
@@ -30,14 +31,29 @@ OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong 
 HORIZON = HORIZONS[-1]
 
 
-def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome, began: float) -> Diagnosis:
+class Nominally(NamedTuple):
+    """What the arm as it was stated misses: forces that it lacks, and errors and predictions of held-out runs."""
+
+    forces: list[LatentForce]
+    errors: dict[str, float]
+    predictions: list
+
+
+def nominally(prepared: Prepared, search: Search, outcome: Outcome) -> Nominally:
+    """What a calibrated arm without any effect misses."""
+    search.restart(outcome.nominal_starts)
+    forces = search.latent(outcome.nominal.fit.vector)
+    return Nominally(forces, *judge(prepared.problem, prepared.held_out, outcome.nominal))
+
+
+def describe(
+    file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome, nominal: Nominally, began: float
+) -> Diagnosis:
     """The diagnosis that an outcome amounts to."""
     problem, parameters = prepared.problem, search.parameters
-    search.restart(outcome.nominal_starts)
-    forces_before = search.latent(outcome.nominal.fit.vector)
+    forces_before, before = nominal.forces, (nominal.errors, nominal.predictions)
     search.restart(outcome.final_starts)
     forces_after = search.latent(outcome.final.fit.vector)
-    before = judge(problem, prepared.held_out, outcome.nominal)
     after = judge(problem, prepared.held_out, outcome.final)
     levels = [level(problem, found) for found, _ in (before, after)]
     gone = (levels[0] - levels[1]) / (levels[0] - 1) if levels[0] > VISIBLE else 0.0
@@ -51,7 +67,7 @@ def describe(file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome
     for place, rival in outcome.rivals:
         candidate = rival.effects[-1]
         alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
-    bent = search.departure(final) > BENT
+    bent = search.is_bent(final, outcome.explained)
     verdict = "unexplained" if bent else _verdict(outcome, levels, gone)
     vector = final.fit.vector
     arm = parameters.build(jnp.asarray(vector))

@@ -6,11 +6,24 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..effects import EFFECTS, SensorGain
+from ..effects import EFFECTS
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
-from .describe import describe, judge, level
-from .hypothesis import BENT, CLOSE, HORIZONS, PARTS, Hypothesis, Outcome, Ranked, Search, Starts, without
+from .describe import AT_FLOOR, describe, judge, level, nominally
+from .hypothesis import (
+    CHANCE,
+    CLOSE,
+    HORIZONS,
+    PARTS,
+    SUSPECT,
+    Hypothesis,
+    Outcome,
+    Ranked,
+    Search,
+    Starts,
+    allowance,
+    without,
+)  # fmt: skip
 from .loose_joint import loose_joints
 from .prepare import Prepared, make_problem
 from .result import Diagnosis
@@ -50,17 +63,24 @@ def diagnose(
     prepared = make_problem(file, recordings)
     search = Search(prepared.problem, prepared.calibration, say)
     outcome = find(search)
+    divided = outcome.level < FAIR and _foretells(prepared, outcome) > AT_FLOOR and len(recordings) > 1
+    if divided:
+        say("the runs held out show what the others do not: the end of each is held out instead")
+        prepared = make_problem(file, recordings, divided)
+        search = Search(prepared.problem, prepared.calibration, say)
+        outcome = find(search)
+    nominal = nominally(prepared, search, outcome)
     much = outcome.level > FAIR and outcome.level - 1 > LITTLE * (outcome.nominal_level - 1)
-    if much or search.departure(outcome.final) > BENT:
+    if much or search.is_bent(outcome.final, outcome.explained):
         say("what is left may lie between a motor and its link")
-        for loose, other, start in loose_joints(file, recordings, say):
+        for loose, other, start in loose_joints(file, recordings, divided, say):
             found = find(other, start)
             if found.final.strength(outcome.final) > STRONG and _foretells(loose, found) < _foretells(
                 prepared, outcome
             ):
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
-    return describe(file, prepared, search, outcome, began)
+    return describe(file, prepared, search, outcome, nominal, began)
 
 
 def _foretells(prepared: Prepared, outcome: Outcome) -> float:
@@ -98,7 +118,8 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         long = (levels[0] - levels[-1]) * fitted.fit.count
         explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
         near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
-        if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1):
+        bent = start is None and search.departure(fitted) > SUSPECT
+        if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not bent:
             break
         horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
         ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
@@ -109,7 +130,6 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             search.restart(base_starts)
             ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
         tried = _short_list(ranked)
-        bent = start is None and search.departure(fitted) > BENT
         if len(fitted.effects) == MOST_EFFECTS or not (tried or bent):
             break
         before, before_starts = (base, base_starts) if far else (fitted, starts)
@@ -123,15 +143,17 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
                     confirmed.append((found.strength(fitted, explained), found, search.starts()))
 
         confirm(tried, before, before_starts)
-        if bent and not (confirmed and decisive(search, fitted, simplest(confirmed)[1])):
+        if bent and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
             search.restart(base_starts)
             straight, straight_starts = straightened(search, base)
             parts = sift(search, straight, straight_starts, search.parts(straight.effects))
             confirm(parts, straight, straight_starts)
+        confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
         if not confirmed:
             break
-        strength, best, best_starts = simplest(confirmed)
-        if strength < STRONG or not _worth_it(fitted, best):
+        strength, best, best_starts = simplest(search, confirmed)
+        straightens = bent and search.departure(best) < SUSPECT and _gain(fitted, best) > STRONG * CHANCE
+        if not (strength > STRONG or straightens):
             break
         base, base_starts = best, best_starts
     assert outcome is not None
@@ -145,11 +167,11 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
 
     Either nothing is left; or much is, which bends all parameters, and most of it has gone.
     """
-    if issubclass(EFFECTS[best.effects[-1].effect], (*PARTS, SensorGain)):
-        return False  # a part of the arm could be meant
+    if issubclass(EFFECTS[best.effects[-1].effect], PARTS):
+        return False  # another part of the arm could be meant
     if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
         return True
-    return best.fit.level < FAIR and search.departure(best) < BENT
+    return best.fit.level < FAIR and search.departure(best) < SUSPECT
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
@@ -181,11 +203,27 @@ def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
     return bool(left < SMALL or gone > HALF * left)
 
 
-def simplest(confirmed: list[Confirmed]) -> Confirmed:
-    """Of the hypotheses that explain practically the same, the one with the fewest parameters."""
+def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
+    """Of the hypotheses that explain practically the same, the one with the fewest parameters.
+
+    Unless one of the others follows clearly better for longer than they were fitted.
+    """
     most = max(strength for strength, _, _ in confirmed)
     tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
-    return min(tied, key=lambda entry: (entry[1].effects[-1].count, -entry[0]))
+    tied.sort(key=lambda entry: (entry[1].effects[-1].count, -entry[0]))
+
+    def followed(entry: Confirmed) -> Hypothesis:
+        search.restart(entry[2])
+        return search.climb(entry[1].effects, entry[1].fit.vector, ceiling=CLOSE)
+
+    chosen = tied[0]
+    further = followed(chosen) if len(tied) > 1 and chosen[1].horizon < HORIZONS[-1] else None
+    if further is not None and further.fit.level > FAIR:
+        for entry in tied[1:]:
+            other = followed(entry)
+            if other.strength(further) > STRONG:
+                chosen, further = entry, other
+    return chosen
 
 
 def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:
@@ -230,17 +268,35 @@ def _gain(before: Hypothesis, after: Hypothesis) -> float:
 
 
 def weigh(search: Search, outcome: Outcome) -> None:
-    """Find the rivals that explain as much as an effect that was added."""
-    final, starts = outcome.final, outcome.final_starts
-    for place, effect in enumerate(final.effects):
+    """Find the rivals that explain as much as an effect that was added.
+
+    One that explains more, or as much with fewer parameters, takes its place.
+    """
+    for place, effect in enumerate(outcome.final.effects):
+        final, starts = outcome.final, outcome.final_starts
         rest = tuple(e for e in final.effects if e is not effect)
+        search.restart(starts)
         found = search.rivals(final, effect)
         for item, share in found[:2]:
-            search.restart(starts)
             vector = without(search.parameters, final.fit.vector, effect)
             base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
             rival = search.confirm(base, starts, item, final.horizon)
+            if rival.horizon != final.horizon or not search.sensible(rival):
+                continue
             lost = _gain(rival, final)
-            if rival.horizon == final.horizon and lost < TIE * share and final.strength(rival) < 1.0:
+            same = lost < TIE * share and final.strength(rival) < 1.0
+            better = -lost > STRONG * allowance(final.fit.count, final.horizon)
+            if better or (same and item.candidate.count < effect.count):
+                search.say(
+                    f"{item.candidate.effect} at {item.candidate.location} in place of {effect.effect}"
+                )
+                order = (*rest[:place], item.candidate, *rest[place:])
+                outcome.final, outcome.final_starts = (
+                    dataclasses.replace(rival, effects=order),
+                    search.starts(),
+                )
+                outcome.rivals = [entry for entry in outcome.rivals if entry[0] != place]
+                break
+            if same:
                 outcome.rivals.append((place, rival))
-    search.restart(starts)
+    search.restart(outcome.final_starts)

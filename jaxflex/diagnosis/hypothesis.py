@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects import EFFECTS, AbstractBodyEffect, TorqueConstant
+from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
 from .calibrate import Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
@@ -24,7 +24,9 @@ TRUSTED = 2.5  # standard deviations up to which a nominal parameter may leave i
 CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
-BENT = 2.0  # departure of the nominal parameters that speaks of something missing
+SUSPECT = 1.5  # departure of the nominal parameters from which parts of the arm are tried in their place
+BENT = 2.0  # the same that speaks of something missing
+FORM_ERROR = 0.01  # of an effect: what a law of friction may differ from the true one by
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
@@ -35,7 +37,7 @@ FORM_IS_KNOWN = {
     "sensor_bias", "sensor_gain", "sensor_drift", "sensor_lag",
 }  # fmt: skip
 BARRED = 1e20  # precision that keeps a parameter where it is
-PARTS = (AbstractBodyEffect, TorqueConstant)  # effects that a nominal parameter could be bent to imitate
+PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal parameters could be bent to imitate
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 FREQUENCIES = 3  # of a periodic disturbance that are tried
@@ -213,6 +215,18 @@ class Search:
         farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
         return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 
+    def is_bent(self, hypothesis: Hypothesis, explained: float) -> bool:
+        """True if the nominal parameters went farther than anything but something missing makes them go.
+
+        `explained`: the cost that the effects account for. Where the form of one of them is not known
+        for certain, parameters make up for its error as far as that may reach.
+        """
+        unsure = {effect.effect for effect in hypothesis.effects} - FORM_IS_KNOWN
+        forms = FORM_ERROR**2 * max(explained, 0.0) if unsure else 0.0
+        return bool(
+            self.departure(hypothesis) > np.sqrt(BENT**2 + forms / max(len(self.parameters.nominal), 1))
+        )
+
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
         return latent_forces(self.problem, self.runs[0], vector, horizon)
@@ -237,7 +251,7 @@ class Search:
             frequencies = [dict(instead.shape)["frequency"], *frequencies]
         motions = [Motion(self.problem, run, vector) for run in self.runs]
         taken = {effect.key for effect in effects if effect is not instead}
-        tried = [c for c in candidates(parameters, motions[0], frequencies) if c.key not in taken]
+        tried = [c for c in candidates(parameters, motions, frequencies) if c.key not in taken]
         columns = list(free.columns)
         own = [] if instead is None else self._own_places(columns, instead)
         linears = [
@@ -278,7 +292,7 @@ class Search:
         taken = {effect.key for effect in effects}
         return [
             Ranked(candidate, start, 0.0, 0.0)
-            for candidate in candidates(self.parameters, motion, [])
+            for candidate in candidates(self.parameters, [motion], [])
             if candidate.key not in taken and issubclass(EFFECTS[candidate.effect], PARTS)
             for start in self._sizes(candidate)
         ]
@@ -299,15 +313,14 @@ class Search:
         if not effect.amplitudes:
             return []
         rest = self.rank(final.fit.vector, final.effects, (final.horizon,), instead=effect)
-        own = next((item.gain for item in rest if item.candidate.key == effect.key), None)
-        if own is None:
+        if not rest:
             return []
+        own = next((r.gain for r in rest if r.candidate.key == effect.key), max(r.gain for r in rest))
         return [
             (item, item.gain)
             for item in rest
             if item.candidate.key != effect.key
-            and item.gain > RIVAL * own
-            and item.candidate.count <= effect.count
+            and item.gain > (RIVAL if item.candidate.count <= effect.count else 1.0) * own
         ]
 
     def sensible(self, found: Hypothesis) -> bool:
@@ -335,3 +348,9 @@ class Outcome:
         self.nominal_level = np.inf  # the same without any effect
         self.rivals: list[tuple[int, Hypothesis]] = []
         self.gains: list[float] = []
+
+    @property
+    def explained(self) -> float:
+        """Cost over the longest horizon that the effects account for, 0 if the motion was lost there."""
+        gone = self.nominal_level - self.level
+        return gone * self.final.fit.count if np.isfinite(gone) else 0.0

@@ -47,7 +47,7 @@ def equations(problem: Problem) -> list[tuple[str, str, int]]:
         found += [(f"voltage_{i + 1}", "V", i) for i in range(joints)]
     place = 2 * joints
     for i, link in enumerate(arm.assemble().links):
-        if link.shapes:
+        if link.shapes > link.loose:
             found.append((f"link_{i + 1}", "N", place))
         place += link.shapes
     return found

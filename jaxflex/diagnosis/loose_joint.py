@@ -18,7 +18,6 @@ from .catalogue import Candidate
 from .hypothesis import Hypothesis, Search, adopt, freedom
 from .parameters import Parameters
 from .prepare import Prepared, make_problem
-from .shooting import Run
 
 GUESSES = {  # of CONTACT: value, and relative uncertainty
     "contact_stiffness": (100.0, 0.5),  # N m/rad
@@ -50,14 +49,15 @@ def trials(joint: int) -> list[tuple[Candidate, float]]:
 
 
 def loose_joints(
-    file: ArmFile, recordings: Sequence[Recording], say: Callable[[str], None]
+    file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Callable[[str], None]
 ) -> "list[tuple[Prepared, Search, Hypothesis]]":
-    """For every joint that drives a flexible link, the best of its trials over the shortest horizon."""
+    """For every joint, the best of its trials over the shortest horizon."""
     found = []
-    for joint, link in enumerate(file.arm.links):
-        if link.modes == 0 or link.model != "assumed_modes" or file.arm.joints[joint].play is not None:
+    for joint, own in enumerate(file.arm.joints):
+        lumped = any(getattr(link, "model", "") == "lumped" for link in file.arm.links[joint : joint + 1])
+        if lumped or own.play is not None:
             continue
-        prepared = make_problem(loosened(file, joint), recordings)
+        prepared = make_problem(loosened(file, joint), recordings, divided)
         search = Search(prepared.problem, prepared.calibration, say)
         straight = search.settle(search.parameters.start)
         places = [(straight.vector, search.starts())]
@@ -66,16 +66,16 @@ def loose_joints(
         tried = []
         for (candidate, size), (vector, starts) in itertools.product(trials(joint), places):
             search.restart(starts)
+            with_it = adopt(search.parameters, vector, candidate, (size,))
             if candidate.effect == "backlash":
-                for run in search.runs:
-                    press(search, run, joint, size)
-            settled = search.settle(adopt(search.parameters, vector, candidate, (size,)))
+                press(search, with_it, joint, size)
+            settled = search.settle(with_it)
             tried.append((settled.cost, len(tried), candidate, settled.vector, search.starts()))
         best = None
         for _, _, candidate, vector, starts in sorted(tried)[:FITTED]:
             search.restart(starts)
-            own = contact_columns(search.parameters, candidate)
-            close = fit(prepared.problem, search.runs, vector, own, 1, 2).vector
+            contact = contact_columns(search.parameters, candidate)
+            close = fit(prepared.problem, search.runs, vector, contact, 1, 2).vector
             fitted = search.climb((candidate,), close, to=1, iterations=8)
             say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             if best is None or fitted.fit.cost < best[0].fit.cost:
@@ -99,12 +99,21 @@ def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
     )
 
 
-def press(search: Search, run: Run, joint: int, gap: float) -> None:
-    """Start every piece with the flank pressed that the moment of the bent link presses."""
+def press(search: Search, vector: np.ndarray, joint: int, gap: float) -> None:
+    """Start every piece with that flank of the play pressed from which it fits better."""
     model = search.parameters.arm.assemble()
-    first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
-    link = model.links[joint]
-    curvature = run.starts[:, first : first + link.shapes] @ np.array(
-        [float(c) for c in link.gauge_curvature]
-    )
-    run.starts[:, first + link.shapes - 1] = np.sign(curvature) * gap / 2
+    place = len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1
+    before = search.starts()
+    found = []
+    for side in (-gap / 2, gap / 2):
+        search.restart(before)
+        for run in search.runs:
+            run.starts[:, place] = side
+        search.settle(vector)
+        misfits = [search.problem.misfit(run, search.problem.predict(run, vector)) for run in search.runs]
+        found.append((search.starts(), misfits))
+    (lower, at_lower), (upper, at_upper) = found
+    for k, run in enumerate(search.runs):
+        better = at_lower[k] < at_upper[k]
+        run.starts = np.where(better[:, None], lower[k][0], upper[k][0])
+        run.slopes = None

@@ -30,7 +30,7 @@ LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
 SMALLEST_NOISE = 2e-4  # of a channel's spread: no model is better than that
 SAMPLES = 25_000  # of one recording that are used
-CALIBRATION = 0.6  # of a single recording; the rest is held out
+CALIBRATION = 0.6  # of a recording that is divided; the rest is held out
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,8 +77,10 @@ def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]
     return dataclasses.replace(arm, joints=tuple(joints)), notes
 
 
-def make_problem(file: ArmFile, recordings: Sequence[Recording]) -> Prepared:
+def make_problem(file: ArmFile, recordings: Sequence[Recording], divided: bool = False) -> Prepared:
     """Check the recordings, find their noise, cut them into pieces.
+
+    `divided`: the end of every recording is held out, and not the later ones of them.
 
     **Raises** `RecordingError` if an input or every output is missing, or too little is left.
     """
@@ -118,14 +120,19 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording]) -> Prepared:
         parameters, outputs, np.array(noise), colour, step, length,
         substeps, np.full(state_size(model, outputs), 1e3),
     )  # fmt: skip
-    runs = [make_run(piece, inputs, setting) for piece in pieces]
-    if len(runs) > 1:
+    if len(pieces) > 1 and not divided:
+        runs = [make_run(piece, inputs, setting) for piece in pieces]
         count = (len(runs) + 1) // 2
         calibration, held_out = runs[:count], runs[count:]
     else:
-        cut = int(CALIBRATION * len(pieces[0]) / length) * length
-        calibration = [make_run(pieces[0].window(0, cut), inputs, setting)]
-        held_out = [make_run(pieces[0].window(cut, len(pieces[0])), inputs, setting, cut * step)]
+        cuts = [int(CALIBRATION * len(piece) / length) * length for piece in pieces]
+        calibration = [
+            make_run(p.window(0, cut), inputs, setting) for p, cut in zip(pieces, cuts, strict=True)
+        ]
+        held_out = [
+            make_run(p.window(cut, len(p)), inputs, setting, cut * step)
+            for p, cut in zip(pieces, cuts, strict=True)
+        ]
     return Prepared(
         Problem(setting), calibration, held_out,
         {name: floors[name].std for name in outputs}, tuple(dict.fromkeys(notes)),

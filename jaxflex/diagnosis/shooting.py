@@ -386,10 +386,10 @@ class Problem:
         """Where the pieces before end, and misfits of every piece from its own start and from there."""
         response = self.predict(run, vector)
         other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], response.end[:-1]]))
-        misfits = [
-            np.mean(
-                (np.where(run.valid[..., None], run.reading - reading, 0.0) / self.setting.noise) ** 2, (1, 2)
-            )
-            for reading in (response.reading, self.predict(other, vector).reading)
-        ]
-        return other.starts, misfits[0], misfits[1]
+        there = self.misfit(other, self.predict(other, vector))
+        return other.starts, self.misfit(run, response), there
+
+    def misfit(self, run: Run, response: Response) -> np.ndarray:
+        """Mean square of what the readings of each piece differ from `response`, in units of the noise."""
+        with np.errstate(over="ignore"):  # a motion may be lost
+            return np.mean(self._misfit(run, response)[0] ** 2, (1, 2))
