@@ -146,6 +146,49 @@ def test_play_keeps_its_energy_and_lets_the_link_turn_freely():
     assert np.abs(later.state.q[2]).max() < 0.06
 
 
+SPLIT = {"hub_inertia": 0.05, "contact_stiffness": 40.0, "motor_share": 0.3}
+
+
+def test_a_bare_axis_with_a_spring_is_two_inertias():
+    """`w^2 = k (1/J_1 + 1/J_2)`, between rotor and load, and a joint flexibility in series with k."""
+    arm = jf.Arm((), (jf.Joint(play=0.0, **SPLIT),))
+    rotor, load = 0.3 * 0.05, 0.7 * 0.05
+    for compliance in (0.0, 0.02):
+        soft = dataclasses.replace(arm, effects=(JointFlexibility(compliance),)) if compliance else arm
+        frequency = jnp.sqrt(1 / (1 / 40.0 + compliance) * (1 / rotor + 1 / load)) / (2 * jnp.pi)
+        np.testing.assert_allclose(jf.driven_frequencies(soft)[1], frequency, rtol=1e-9)
+
+
+def test_a_bare_axis_crosses_its_play_and_keeps_its_momentum():
+    arm = jf.Arm((), (jf.Joint(play=0.1, **SPLIT),))
+    start = jf.InitialState(deflection_rates=jnp.array([1.0]))
+    times = jnp.linspace(0.0, 0.3, 61)
+    run = jf.simulate(
+        arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start, method=jf.Adaptive(rtol=1e-10, atol=1e-12)
+    )
+    crossing = times < 0.05
+    np.testing.assert_allclose(run.state.q[1][crossing], times[crossing], atol=1e-9)
+    np.testing.assert_allclose(run["angle_1"][crossing], 0.0, atol=1e-12)
+    rotor_rate, load_rate = run.state.qd[0], run.state.qd[0] + run.state.qd[1]
+    momentum = 0.05 * (0.3 * rotor_rate + 0.7 * load_rate)
+    np.testing.assert_allclose(momentum, 0.05 * 0.7, rtol=1e-7)
+    assert np.abs(rotor_rate).max() > 0.5  # the flank was hit
+
+
+def test_a_rigid_link_with_play_is_the_limit_of_a_stiff_one():
+    joint = jf.Joint(play=0.02, **SPLIT)
+    stiff, rigid = (jf.Arm((jf.Link(0.4, 0.15, 1e6, modes=m),), (joint,), jf.Payload(0.02)) for m in (1, 0))
+    several = jf.mass_matrix(stiff.assemble(), jnp.zeros(3))
+    two = jf.mass_matrix(rigid.assemble(), jnp.zeros(2))
+    np.testing.assert_allclose(two, several[jnp.ix_(jnp.array([0, 2]), jnp.array([0, 2]))], rtol=1e-6)
+
+
+def test_play_at_a_lumped_link_is_refused():
+    arm = jf.Arm((jf.Link(0.4, 0.15, 0.7, model="lumped"),), (jf.Joint(play=0.02, **SPLIT),))
+    with pytest.raises(ValueError, match="lumped link has no play"):
+        arm.assemble()
+
+
 @pytest.mark.parametrize("name", ["coulomb_friction", "stribeck_friction", "quadratic_drag"])
 def test_friction_takes_energy(name):
     rates, zero = jnp.linspace(-2.0, 2.0, 41), jnp.zeros(())

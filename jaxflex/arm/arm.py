@@ -198,9 +198,16 @@ class AssembledArm(eqx.Module):
         return tuple(q[:n]), deflections
 
     def stiffness(self) -> tuple[Scalar, ...]:
-        """Stiffness of every coordinate: zero for the joints, K_k [N/m] for the links."""
-        zeros = (jnp.zeros_like(self.joints[0].hub_inertia),) * len(self.links)
-        return zeros + tuple(k for link in self.links for k in link.stiffness)
+        """Stiffness of every coordinate at rest: zero for the joints, K_k [N/m] for the links.
+
+        The flanks of a play touch at rest if there is no gap between them.
+        """
+        found = [jnp.zeros_like(self.joints[0].hub_inertia)] * len(self.links)
+        for link, joint in zip(self.links, self.joints, strict=True):
+            found += link.stiffness
+            if link.loose and joint.contact_stiffness is not None:
+                found[-1] = joint.contact_stiffness * joint.touches(jnp.zeros_like(found[-1]))
+        return tuple(found)
 
     def damping(self, q: tuple | None = None) -> tuple[Scalar, ...]:
         """Viscous damping of every coordinate: b [N m s/rad], then D_k [N s/m].

@@ -113,6 +113,9 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
         reading = problem.predict(run, vector).reading
+        lost = ~np.isfinite(reading).all((1, 2))[:, None, None]
+        # a motion that cannot be followed counts as if nothing had been foretold of it
+        reading = np.where(lost, np.mean(run.reading, (0, 1)), reading)
         error = np.where(run.valid[..., None], run.reading - reading, 0.0)
         squares.append((error**2).sum((0, 1)) / run.valid.sum())
         predictions.append((run, reading))
@@ -138,6 +141,8 @@ def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothes
     search.restart(outcome.final_starts)
     free = freedom(search.parameters, final.effects)
     found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
+    if not (np.isfinite(found.cost) and np.isfinite(found.normal.matrix).all()):
+        return final  # a run held out cannot be followed
     return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
 
 
@@ -168,8 +173,11 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
     found, parameters = hypothesis.fit, search.parameters
     matrix = found.normal.matrix + np.diag(found.freedom.prior(found.vector)[2])
     scale = np.sqrt(np.clip(np.diag(matrix), 1e-300, None))
-    inverse = np.linalg.pinv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
-    spread = np.sqrt(np.clip(np.diag(inverse), 0, None) * max(found.level, 1.0))
+    tidy = matrix / np.outer(scale, scale)
+    spread = np.full(len(matrix), np.inf)  # of a motion that was lost nothing is known
+    if np.isfinite(tidy).all():
+        inverse = np.linalg.pinv(tidy) / np.outer(scale, scale)
+        spread = np.sqrt(np.clip(np.diag(inverse), 0, None) * max(found.level, 1.0))
     estimates = {}
     for column, std in zip(found.freedom.columns, spread, strict=True):
         value = found.vector[column]

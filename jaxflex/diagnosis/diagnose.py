@@ -171,7 +171,7 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
         return False  # another part of the arm could be meant
     if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
         return True
-    return best.fit.level < FAIR and search.departure(best) < SUSPECT
+    return bool(best.fit.level < FAIR and search.departure(best) < SUSPECT)
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:

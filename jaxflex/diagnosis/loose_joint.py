@@ -100,15 +100,25 @@ def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
 
 
 def press(search: Search, vector: np.ndarray, joint: int, gap: float) -> None:
-    """Start every piece with that flank of the play pressed from which it fits better."""
+    """Start every piece with the flank pressed that the moment of the bent link presses.
+
+    Where nothing bends, with that from which the piece fits better.
+    """
     model = search.parameters.arm.assemble()
-    place = len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1
+    first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
+    link = model.links[joint]
+    last = first + link.shapes - 1
+    if link.shapes > 1:
+        curvature = np.array([float(c) for c in link.gauge_curvature])
+        for run in search.runs:
+            run.starts[:, last] = np.sign(run.starts[:, first : last + 1] @ curvature) * gap / 2
+        return
     before = search.starts()
     found = []
     for side in (-gap / 2, gap / 2):
         search.restart(before)
         for run in search.runs:
-            run.starts[:, place] = side
+            run.starts[:, last] = side
         search.settle(vector)
         misfits = [search.problem.misfit(run, search.problem.predict(run, vector)) for run in search.runs]
         found.append((search.starts(), misfits))

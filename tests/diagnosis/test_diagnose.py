@@ -48,6 +48,24 @@ def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
     assert [e.name for e in found.improved.effects] == [e.name for e in found.effects]
 
 
+@pytest.mark.parametrize(
+    "name, where_it_shows",
+    [
+        ("voltage_saturation", "in the second run alone"),
+        ("viscous_friction", "in how far the stated parameters would have to go"),
+        ("joint_flexibility", "between rotor and load"),
+    ],
+)
+def test_what_a_bare_axis_hides_is_named(tmp_path, name, where_it_shows):
+    (case,) = make_cases("axis", [(name,)], [10.0], [0])
+    write_case(case, tmp_path)
+    found = answer(tmp_path)
+    assert found.verdict == "missing_effect", where_it_shows
+    assert [e.name for e in found.effects] == [name]
+    for channel, floor in found.gap.noise_floor.items():
+        assert found.gap.after[channel] < 1.2 * floor
+
+
 def test_nothing_hidden_is_nothing_missing(hidden):
     found = answer(hidden["nothing"][0])
     assert found.verdict == "nothing_missing" and not found.effects
