@@ -39,6 +39,7 @@ HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
 FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
 HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
+SOLVED = 0.2  # of what is left of a gap: a joint that comes apart, with all it adds, must leave less
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 
 
@@ -51,8 +52,9 @@ def diagnose(
     """Compare the arm of `file` with `recordings` and name what it lacks.
 
     Nominal parameters are calibrated within the uncertainty that the file states. Half of
-    the recordings (the last 40 % of a single one) are held out to judge by. `say` is told
-    of the progress, a line at a time.
+    the recordings (the last 40 % of a single one) are held out to judge by; where those show
+    what the others do not, the last 40 % of each instead. `say` is told of the progress, a
+    line at a time.
 
     **Returns** a `Diagnosis` with one of four verdicts.
 
@@ -75,9 +77,8 @@ def diagnose(
         say("what is left may lie between a motor and its link")
         for loose, other, start in loose_joints(file, recordings, divided, say):
             found = find(other, start)
-            if found.final.strength(outcome.final) > STRONG and _foretells(loose, found) < _foretells(
-                prepared, outcome
-            ):
+            gone = _foretells(loose, found) - 1 < SOLVED * (_foretells(prepared, outcome) - 1)
+            if gone and found.final.strength(outcome.final) > STRONG:
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
     return describe(file, prepared, search, outcome, nominal, began)
@@ -221,7 +222,7 @@ def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
     if further is not None and further.fit.level > FAIR:
         for entry in tied[1:]:
             other = followed(entry)
-            if other.strength(further) > STRONG:
+            if other.strength(further) > STRONG and _worth_it(further, other):
                 chosen, further = entry, other
     return chosen
 

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from ..arm.arm import AssembledArm
 from ..drive import drive, drive_effects, effect_torques, has_current_state, joint_effects
-from ..dynamics.lagrange import linearisable_accelerations
+from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
 from ..effects import AbstractDryFriction, WindingHeating
 from ..scalars import Scalar
@@ -91,7 +91,7 @@ def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tup
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
     total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(q), qd, strict=True))
-    return drives, linearisable_accelerations(model, q, qd, total)
+    return drives, accelerations(model, q, qd, total)
 
 
 @simplified

@@ -85,13 +85,21 @@ def _generalised_force(model: AssembledArm, q: tuple, qd: tuple) -> tuple:
     return jax.grad(lambda q: kinetic_energy(model, q, qd) - potential_energy(model, q))(q)
 
 
-@simplified
+@eqx.filter_custom_jvp
 def accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
     """`q'' = M^-1 (force - bias)`, all tuples of scalars.
 
     The bias `d/dt(dL/dq')|_{q''=0} - dL/dq` holds Coriolis, centrifugal, gravity and
     elastic terms; `force` everything else (damping, friction, motors, disturbances).
+    Its slope is `M dq'' = dforce - d(M q'' + bias)|_{q''}`: neither the inverse nor most
+    of M is differentiated, which saves a third of the work of a slope.
     """
+    return unrolled_accelerations(model, q, qd, force)
+
+
+@simplified
+def unrolled_accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
+    """The same without a slope of its own."""
     return _accelerations(model, q, qd, force)
 
 
@@ -105,16 +113,7 @@ def _accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tu
     return solve(lower, right)
 
 
-@eqx.filter_custom_jvp
-def linearisable_accelerations(model: AssembledArm, q: tuple, qd: tuple, force: tuple) -> tuple[Scalar, ...]:
-    """The same, for those who want its slopes: `M dq'' = dforce - d(M q'' + bias)|_{q''}`.
-
-    Neither the inverse nor most of M is differentiated, which halves the work of a slope.
-    """
-    return accelerations(model, q, qd, force)
-
-
-@linearisable_accelerations.def_jvp
+@accelerations.def_jvp
 def _accelerations_along(primals, tangents):
     return _with_slope(primals, tangents)
 

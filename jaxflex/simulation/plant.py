@@ -20,7 +20,7 @@ from ..drive import (
     initial_drive_memory,
     joint_effects,
 )
-from ..dynamics.lagrange import linearisable_accelerations
+from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
 from ..scalars import Scalar, dot
 from ..sensors import measured_deflection
@@ -105,7 +105,7 @@ class Plant(eqx.Module):
         torques = torques + (zero,) * (self.model.size - len(torques))
         damped = map(lambda d, v: d * v, self.model.damping(state.q), state.qd)
         force = tuple(map(lambda a, b: a - b, torques, damped))
-        return linearisable_accelerations(self.model, state.q, state.qd, force)
+        return accelerations(self.model, state.q, state.qd, force)
 
     def derivative(self, t: Scalar, state: State) -> State:
         """Time derivative of the state, of the same structure."""
