@@ -95,7 +95,12 @@ def read_channels(
 
 
 def measured_deflection(link: LinkModel, eta: tuple) -> Scalar:
-    """Tip deflection [m] from the tangent at the hub, or past the spring of a flexible joint."""
+    """Tip deflection [m] from the tangent at the hub, or past the spring of a flexible joint.
+
+    What its instrument shows of it: of a gauge, its bending by the scale of a weight at the tip.
+    """
+    if link.shown is not None:
+        return dot(link.shown, eta)  # pyright: ignore
     return dot(link.tip_deflection, eta) - link.length * dot(link.joint_twist, eta)  # pyright: ignore
 
 

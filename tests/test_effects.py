@@ -164,7 +164,12 @@ def test_a_bare_axis_crosses_its_play_and_keeps_its_momentum():
     start = jf.InitialState(deflection_rates=jnp.array([1.0]))
     times = jnp.linspace(0.0, 0.3, 61)
     run = jf.simulate(
-        arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start, method=jf.Adaptive(rtol=1e-10, atol=1e-12)
+        arm,
+        OpenLoop(),
+        Step((0.0,), (0.0,)),
+        times,
+        initial=start,
+        method=jf.Adaptive(rtol=1e-10, atol=1e-12),
     )
     crossing = times < 0.05
     np.testing.assert_allclose(run.state.q[1][crossing], times[crossing], atol=1e-9)

@@ -1,10 +1,13 @@
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import jaxflex as jf
 from controllers import PD, Move
-from jaxflex.sensors import first_order_lag
+from jaxflex.sensors import first_order_lag, measured_deflection
 
 TIMES = jnp.linspace(0.0, 0.4, 2001)
 
@@ -71,3 +74,25 @@ def test_gain_bias_noise_and_counts():
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
     slope = jax.grad(lambda g: jf.Sensor(gain=g, resolution=count).read(t, signal).sum())(1.0)
     np.testing.assert_allclose(slope, signal.sum())
+
+
+def test_a_gauge_scaled_under_a_weight_at_the_tip_shows_the_tip_under_one():
+    """Statically the two agree; of the second mode the gauge shows many times the tip's deflection."""
+    link = jf.Link(0.4, 0.15, 0.7, modes=8, mode_shapes="clamped_free", gauge_position=0.02)
+    by_tip, by_gauge = (
+        jf.Arm((dataclasses.replace(link, deflection_from=kind),), (jf.Joint(hub_inertia=1e-3),)).assemble()
+        for kind in ("tip", "gauge")
+    )
+    (constants,) = by_tip.links
+    bent = tuple(w / k for w, k in zip(constants.tip_deflection, constants.stiffness, strict=True))
+    shown = [float(measured_deflection(arm.links[0], bent)) for arm in (by_tip, by_gauge)]
+    np.testing.assert_allclose(shown[0], 0.4**3 / (3 * 0.7), rtol=1e-3)
+    np.testing.assert_allclose(shown[1], shown[0], rtol=0.02)
+    second = tuple(jnp.eye(8)[1])
+    shares = [abs(float(measured_deflection(arm.links[0], second))) for arm in (by_tip, by_gauge)]
+    assert shares[1] > 5 * shares[0]
+
+
+def test_an_unknown_instrument_is_refused():
+    with pytest.raises(ValueError, match="deflection_from"):
+        jf.Link(0.4, 0.15, 0.7, deflection_from="camera")

@@ -1,5 +1,6 @@
 """The parts of an arm as an engineer describes them: links, joints, payload."""
 
+import dataclasses
 from abc import abstractmethod
 
 import equinox as eqx
@@ -23,6 +24,7 @@ def damping_ratios(value: "ScalarLike | str | tuple[ScalarLike, ...]") -> tuple[
 
 
 MOTIONS = ("finite", "small")
+INSTRUMENTS = ("tip", "gauge")
 
 
 class AbstractLink(eqx.Module):
@@ -72,6 +74,8 @@ class Link(AbstractLink):
     - `root_compliance` [rad/(N m)] of the clamp that holds the link to its hub
     - `shortening`: share of the shortening by bending that is counted, 1 for all of it
       (centrifugal stiffening); None to leave it out
+    - `deflection_from`: what measures the tip's deflection: `"tip"`, or `"gauge"`, a strain gauge
+      whose reading was scaled under a weight at the tip, and which higher modes drive all the more
     - `motion`: `"finite"`, or `"small"` to leave out what deflections add to the inertia about
       the root, the one term that makes a single link non-linear (for an arm of one joint)
     """
@@ -90,6 +94,7 @@ class Link(AbstractLink):
     root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
     shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     motion: str = eqx.field(static=True, default="finite")
+    deflection_from: str = eqx.field(static=True, default="tip")
 
     __repr__ = brief
 
@@ -98,6 +103,10 @@ class Link(AbstractLink):
             raise ValueError(f"a link needs modes >= 0, found {self.modes}.")
         if self.motion not in MOTIONS:
             raise ValueError(f"motion = {self.motion!r} is unknown; allowed are {', '.join(MOTIONS)}.")
+        if self.deflection_from not in INSTRUMENTS:
+            raise ValueError(
+                f"deflection_from = {self.deflection_from!r} is unknown; allowed are {', '.join(INSTRUMENTS)}."
+            )
         if self.model not in ("assumed_modes", "lumped"):
             raise ValueError(f"model = {self.model!r} is unknown; allowed are assumed_modes, lumped.")
         if self.mode_shapes not in MODE_SHAPES:
@@ -147,6 +156,14 @@ class Link(AbstractLink):
 
     def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         """The constants of the link, its shapes chosen for what hangs on it."""
+        model = self._constants(distal, carries_link, joint)
+        if self.deflection_from == "tip":
+            return model
+        # under a force F at the tip the gauge bends by F (l - x) / EI, and the tip by F l^3 / 3 EI
+        lever = self.length**3 / (3 * (self.length - self.gauge_position))
+        return dataclasses.replace(model, shown=tuple(lever * bend for bend in model.gauge_curvature))
+
+    def _constants(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         if self.modes == 0:
             return rigid_link(self.length, self.mass, joint.play is not None)
         if self.model == "lumped":

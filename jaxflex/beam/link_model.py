@@ -33,6 +33,8 @@ class LinkModel(eqx.Module):
     - `joint_twist`: rotation [rad] of the link's root against the motor, for which the
       joint's spring or play gives way; `loose`: the last shape is the play
     - `shortening`: what bending takes off the length, None where it is left out
+    - `shown`: what the instrument of the tip's deflection shows of every shape, if that is not
+      the deflection itself
     """
 
     length: Scalar
@@ -50,6 +52,7 @@ class LinkModel(eqx.Module):
     joint_twist: tuple[Scalar, ...] = ()
     shortening: "Shortening | None" = None
     loose: bool = eqx.field(static=True, default=False)
+    shown: tuple[Scalar, ...] | None = None
 
     @property
     def shapes(self) -> int:

@@ -10,12 +10,12 @@ from ..effects import EFFECTS
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .describe import AT_FLOOR, describe, judge, level, nominally
+from .gauge import by_gauge
 from .hypothesis import (
     CHANCE,
     CLOSE,
     HORIZONS,
     PARTS,
-    SUSPECT,
     Hypothesis,
     Outcome,
     Ranked,
@@ -40,6 +40,10 @@ LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be bette
 FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
 HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
 SOLVED = 0.2  # of what is left of a gap: a joint that comes apart, with all it adds, must leave less
+BY_GAUGE = (
+    "the tip's deflection is followed far better as what a strain gauge at the root shows, scaled under a weight "
+    "at the tip (deflection_from = 'gauge'); at high frequencies the two differ"
+)
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 
 
@@ -72,6 +76,15 @@ def diagnose(
         search = Search(prepared.problem, prepared.calibration, say)
         outcome = find(search)
     nominal = nominally(prepared, search, outcome)
+    gauged = by_gauge(file) if _astray(outcome) > CLOSE and _shows_deflection(prepared) else None
+    if gauged is not None:
+        say("the deflections may be those that a strain gauge stands for")
+        other = make_problem(gauged, recordings, divided)
+        searching = Search(other.problem, other.calibration, say)
+        found = find(searching)
+        if _astray(found) < HALFWAY * _astray(outcome):
+            file, search, outcome = gauged, searching, found
+            prepared = dataclasses.replace(other, notes=(*other.notes, BY_GAUGE))
     much = outcome.level > FAIR and outcome.level - 1 > LITTLE * (outcome.nominal_level - 1)
     if much or search.is_bent(outcome.final, outcome.explained):
         say("what is left may lie between a motor and its link")
@@ -82,6 +95,15 @@ def diagnose(
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
     return describe(file, prepared, search, outcome, nominal, began)
+
+
+def _astray(outcome: Outcome) -> float:
+    """Misfit a reading over the shortest horizon, in units of the noise."""
+    return outcome.final.costs[HORIZONS[0]] / outcome.final.fit.count
+
+
+def _shows_deflection(prepared: Prepared) -> bool:
+    return any(name.startswith("tip_deflection") for name in prepared.problem.setting.channels)
 
 
 def _foretells(prepared: Prepared, outcome: Outcome) -> float:
@@ -119,7 +141,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         long = (levels[0] - levels[-1]) * fitted.fit.count
         explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
         near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
-        bent = start is None and search.departure(fitted) > SUSPECT
+        bent = start is None and search.is_suspect(fitted)
         if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not bent:
             break
         horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
@@ -153,7 +175,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         if not confirmed:
             break
         strength, best, best_starts = simplest(search, confirmed)
-        straightens = bent and search.departure(best) < SUSPECT and _gain(fitted, best) > STRONG * CHANCE
+        straightens = bent and not search.is_suspect(best) and _gain(fitted, best) > STRONG * CHANCE
         if not (strength > STRONG or straightens):
             break
         base, base_starts = best, best_starts
@@ -172,7 +194,7 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
         return False  # another part of the arm could be meant
     if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
         return True
-    return bool(best.fit.level < FAIR and search.departure(best) < SUSPECT)
+    return bool(best.fit.level < FAIR and not search.is_suspect(best))
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:

@@ -7,8 +7,9 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
-from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
+from ..effects import EFFECTS, AbstractBodyEffect, AbstractDryFriction, SensorGain, TorqueConstant
 from .calibrate import Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
@@ -24,9 +25,11 @@ TRUSTED = 2.5  # standard deviations up to which a nominal parameter may leave i
 CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
-SUSPECT = 1.5  # departure of the nominal parameters from which parts of the arm are tried in their place
-BENT = 2.0  # the same that speaks of something missing
-FORM_ERROR = 0.01  # of an effect: what a law of friction may differ from the true one by
+SUSPECT = (
+    0.99  # of arms as they were stated, the share whose parameters depart less: beyond it parts are tried
+)
+BENT = 0.999  # the same, beyond which something is missing
+FORM_ERROR = 0.01  # of its effect: what a law of friction may differ from the true one by
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
@@ -197,6 +200,11 @@ class Search:
         self.restart(starts)
         return level
 
+    @property
+    def stated(self) -> int:
+        """Number of parameters of the arm that are stated, 1 at least."""
+        return max(sum(not part.is_of_contact for part in self.parameters.nominal), 1)
+
     def departures(self, hypothesis: Hypothesis) -> dict[str, float]:
         """How far each stated parameter of the arm went, in standard deviations."""
         return {
@@ -215,17 +223,23 @@ class Search:
         farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
         return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 
+    def usual(self, share: float) -> float:
+        """The departure that this share of arms stays below whose parameters are as uncertain as stated."""
+        return float(np.sqrt(chi2.ppf(share, self.stated) / self.stated))
+
+    def is_suspect(self, hypothesis: Hypothesis) -> bool:
+        """True if the nominal parameters went far enough to imitate a part of the arm that is not as stated."""
+        return self.departure(hypothesis) > self.usual(SUSPECT)
+
     def is_bent(self, hypothesis: Hypothesis, explained: float) -> bool:
         """True if the nominal parameters went farther than anything but something missing makes them go.
 
-        `explained`: the cost that the effects account for. Where the form of one of them is not known
-        for certain, parameters make up for its error as far as that may reach.
+        `explained`: the cost that the effects account for. No law of friction is the true one, and
+        parameters make up for its error as far as that may reach.
         """
-        unsure = {effect.effect for effect in hypothesis.effects} - FORM_IS_KNOWN
-        forms = FORM_ERROR**2 * max(explained, 0.0) if unsure else 0.0
-        return bool(
-            self.departure(hypothesis) > np.sqrt(BENT**2 + forms / max(len(self.parameters.nominal), 1))
-        )
+        rubs = any(issubclass(EFFECTS[effect.effect], AbstractDryFriction) for effect in hypothesis.effects)
+        error = FORM_ERROR**2 * max(explained, 0.0) if rubs else 0.0
+        return bool(self.departure(hypothesis) > np.hypot(self.usual(BENT), np.sqrt(error / self.stated)))
 
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""

@@ -216,7 +216,7 @@ def first_starts(
         strain = found.get(f"strain_{i + 1}")
         if link.shapes:
             if bent is not None:
-                shape = float(link.tip_deflection[0])
+                shape = float((link.shown or link.tip_deflection)[0])
                 q[:, place], qd[:, place] = smooth(bent, 0)[at] / shape, smooth(bent, 1)[at] / shape
             elif strain is not None:
                 shape = float(arm.links[i].thickness / 2 * link.gauge_curvature[0])

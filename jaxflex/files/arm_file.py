@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..arm.arm import DRIVES, Arm
-from ..arm.parts import MOTIONS, Joint, Link, Payload
+from ..arm.parts import INSTRUMENTS, MOTIONS, Joint, Link, Payload
 from ..beam.basis import MODE_SHAPES
 from ..brief import brief
 from ..effects import EFFECTS, AbstractEffect
@@ -147,6 +147,7 @@ def _link(fields: Fields) -> Link:
         root_compliance=fields.not_negative("root_compliance"),
         shortening=fields.not_negative("shortening", None),
         motion=fields.choice("motion", "finite", list(MOTIONS)),
+        deflection_from=fields.choice("deflection_from", "tip", list(INSTRUMENTS)),
     )
     by_section = any(fields.has(key) for key in ("width", "youngs_modulus", "density"))
     if by_section and any(fields.has(key) for key in DIRECT_KEYS):

@@ -57,6 +57,7 @@ def test_reads_what_it_says():
         ("length = 0.4", 'length = 0.4\ndamping = "none"', "damping: found 'none'; allowed is 'ahmad'"),
         ("length = 0.4", 'length = 0.4\nmodel = "lumped"\nsegments = 1', "at most segments = 1"),
         ("length = 0.4", "length = 0.4\ngauge_position = 0.5", "a number from 0 to the length"),
+        ("length = 0.4", 'length = 0.4\ndeflection_from = "camera"', "tip, gauge"),
         ("density = 2700.0", "", "link 1: density: missing"),
         (
             "hub_inertia = 1e-4",
