@@ -25,6 +25,7 @@ from .shooting import Problem, Run
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.5  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
+LEAST_RISE = 0.05  # of friction towards rest, of its level: below it there is none
 SATURATION = (0.4, 0.55, 0.7, 0.8, 0.88, 0.95)  # of the largest command
 COOLING = (0.0, 10.0)  # s
 
@@ -68,6 +69,8 @@ def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
     """False for a friction that pushes, a spring that drives away, a lag into the future."""
     if not candidate.amplitudes:
         return bool(0.3 < step[0] < 3.0)
+    if candidate.effect == "stribeck_friction" and step[0] < LEAST_RISE * step[1]:
+        return False  # which is Coulomb's
     anything = (-np.inf, np.inf) if candidate.effect in EITHER_SIGN else (0.0, np.inf)
     low, high = BOUNDS.get(candidate.effect, anything)
     return all(low <= value <= high for value in step[: len(candidate.amplitudes)])

@@ -113,7 +113,7 @@ def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[di
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
         reading = problem.predict(run, vector).reading
-        lost = ~np.isfinite(reading).all((1, 2))[:, None, None]
+        lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
         # a motion that cannot be followed counts as if nothing had been foretold of it
         reading = np.where(lost, np.mean(run.reading, (0, 1)), reading)
         error = np.where(run.valid[..., None], run.reading - reading, 0.0)

@@ -1,14 +1,20 @@
 """The whole workflow on data in which the effect is hidden, made by plants of another making."""
 
+import dataclasses
 import json
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxflex as jf
+from controllers import Replayed, Step
 from experiments.blind.make import make_cases, write_case
 from jaxflex.diagnosis import diagnose
+from jaxflex.diagnosis.gauge import by_gauge
+from jaxflex.diagnosis.hypothesis import Search
+from jaxflex.diagnosis.prepare import make_problem
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 
@@ -71,6 +77,33 @@ def test_nothing_hidden_is_nothing_missing(hidden):
     assert found.verdict == "nothing_missing" and not found.effects
 
 
+def test_a_deflection_that_a_gauge_stands_for_is_followed_as_one():
+    """What a gauge shows of the second mode no start, parameter or effect can imitate."""
+    arm = jf.foldager_link(0.02, modes=2)
+    link = dataclasses.replace(arm.links[0], deflection_from="gauge", modes=3)
+    times = jnp.linspace(0.0, 1.0, 501)
+    blows = Replayed(3.0 * jnp.sign(jnp.sin(40.0 * times))[:, None], 0.002)
+    true = dataclasses.replace(arm, links=(link,))
+    run = jf.simulate(true, blows, Step((0.0,), (0.0,)), times)
+    noise = np.random.default_rng(0).normal(size=(2, 501)) * np.array([[1e-4], [2e-5]])
+    channels = {
+        "voltage_1": np.asarray(run["voltage_1"]),
+        "angle_1": np.asarray(run["angle_1"]) + noise[0],
+        "tip_deflection_1": np.asarray(run["tip_deflection_1"]) + noise[1],
+    }
+    recordings = [jf.Recording(np.asarray(times), channels, ())]
+    file = jf.ArmFile(arm, {"default": 0.03}, None)
+    gauged = by_gauge(file)
+    assert gauged is not None and by_gauge(gauged) is None
+    levels = []
+    for known in (file, gauged):
+        found = make_problem(known, recordings)
+        search = Search(found.problem, found.calibration, print)
+        levels.append(search.settle(search.parameters.start).level)
+    assert levels[0] > 10 * levels[1]
+    assert levels[1] < 3.0
+
+
 def shared(*parts):
     folder = SHARED.joinpath(*parts)
     if not folder.exists():
@@ -86,6 +119,16 @@ def test_friction_of_a_measured_axis():
     assert found.effects[0].parameters["torque"].value == pytest.approx(20.4, rel=0.1)
     assert found.calibrated["hub_inertia"].value == pytest.approx(95.1, rel=0.05)
     assert found.gap.after["angle_1"] < 0.4 * found.gap.before["angle_1"]
+
+
+@pytest.mark.slow
+def test_friction_of_a_measured_flexible_link():
+    """Quanser's rotary link, its deflection from a gauge at the root; by least squares, friction of 0.0175 N m."""
+    found = answer(shared("data", "quanser_flexible_link"))
+    assert found.effects[0].name == "coulomb_friction"
+    assert 0.01 < found.effects[0].parameters["torque"].value < 0.04
+    assert any("strain gauge" in note for note in found.notes)
+    assert found.explained > 0.8
 
 
 @pytest.mark.slow
