@@ -90,8 +90,11 @@ def diagnose(
         say("what is left may lie between a motor and its link")
         for loose, other, start in loose_joints(file, recordings, divided, say):
             found = find(other, start)
-            gone = _foretells(loose, found) - 1 < SOLVED * (_foretells(prepared, outcome) - 1)
-            if gone and found.final.strength(outcome.final) > STRONG:
+            left = _foretells(loose, found)
+            gone = left - 1 < SOLVED * (_foretells(prepared, outcome) - 1)
+            # of a bare axis the load is never seen, and its starts fit much that is something else
+            seen = bool(file.arm.links) or left < AT_FLOOR
+            if gone and seen and found.final.strength(outcome.final) > STRONG:
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
     return describe(file, prepared, search, outcome, nominal, began)
@@ -309,7 +312,8 @@ def weigh(search: Search, outcome: Outcome) -> None:
             lost = _gain(rival, final)
             same = lost < TIE * share and final.strength(rival) < 1.0
             better = -lost > STRONG * allowance(final.fit.count, final.horizon)
-            if better or (same and item.candidate.count < effect.count):
+            simpler = same and item.candidate.count < effect.count
+            if (better or simpler) and not search.is_of_loose_joint(effect):
                 search.say(
                     f"{item.candidate.effect} at {item.candidate.location} in place of {effect.effect}"
                 )

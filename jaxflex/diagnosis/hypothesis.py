@@ -337,6 +337,12 @@ class Search:
             and item.gain > (RIVAL if item.candidate.count <= effect.count else 1.0) * own
         ]
 
+    def is_of_loose_joint(self, effect: Candidate) -> bool:
+        """True of what the arm of this problem was taken apart for."""
+        if effect.effect not in ("backlash", "joint_flexibility"):
+            return False
+        return self.parameters.arm.joints[int(effect.location.rpartition("_")[2]) - 1].play is not None
+
     def sensible(self, found: Hypothesis) -> bool:
         """False if the effect added last came to a size that makes no sense."""
         last = found.effects[-1]
