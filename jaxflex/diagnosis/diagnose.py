@@ -95,6 +95,7 @@ def diagnose(
             # of a bare axis the load is never seen, and its starts fit much that is something else
             seen = bool(file.arm.links) or left < AT_FLOOR
             if gone and seen and found.final.strength(outcome.final) > STRONG:
+                found.nominal_level = outcome.nominal_level  # of the arm as it was stated
                 prepared, search, outcome = loose, other, found
     weigh(search, outcome)
     return describe(file, prepared, search, outcome, nominal, began)

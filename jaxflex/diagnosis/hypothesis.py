@@ -29,7 +29,7 @@ SUSPECT = (
     0.99  # of arms as they were stated, the share whose parameters depart less: beyond it parts are tried
 )
 BENT = 0.999  # the same, beyond which something is missing
-FORM_ERROR = 0.01  # of its effect: what a law of friction may differ from the true one by
+FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
@@ -234,11 +234,14 @@ class Search:
     def is_bent(self, hypothesis: Hypothesis, explained: float) -> bool:
         """True if the nominal parameters went farther than anything but something missing makes them go.
 
-        `explained`: the cost that the effects account for. No law of friction is the true one, and
-        parameters make up for its error as far as that may reach.
+        `explained`: the cost that the effects account for. No law of friction or contact is the true
+        one, and parameters make up for its error as far as that may reach.
         """
-        rubs = any(issubclass(EFFECTS[effect.effect], AbstractDryFriction) for effect in hypothesis.effects)
-        error = FORM_ERROR**2 * max(explained, 0.0) if rubs else 0.0
+        touches = any(
+            issubclass(EFFECTS[effect.effect], AbstractDryFriction) or self.is_of_loose_joint(effect)
+            for effect in hypothesis.effects
+        )
+        error = FORM_ERROR**2 * max(explained, 0.0) if touches else 0.0
         return bool(self.departure(hypothesis) > np.hypot(self.usual(BENT), np.sqrt(error / self.stated)))
 
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
