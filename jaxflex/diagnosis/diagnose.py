@@ -69,7 +69,7 @@ def diagnose(
     prepared = make_problem(file, recordings)
     search = Search(prepared.problem, prepared.calibration, say)
     outcome = find(search)
-    divided = outcome.level < FAIR and _foretells(prepared, outcome) > AT_FLOOR and len(recordings) > 1
+    divided = bool(outcome.level < FAIR and _foretells(prepared, outcome) > AT_FLOOR and len(recordings) > 1)
     if divided:
         say("the runs held out show what the others do not: the end of each is held out instead")
         prepared = make_problem(file, recordings, divided)

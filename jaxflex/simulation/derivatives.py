@@ -23,8 +23,8 @@ FEW = 24  # parameters up to which forward mode is the better one, compilation c
 def adjoint_for(parameters: int) -> diffrax.AbstractAdjoint:
     """How `simulate` is best differentiated for this many parameters; for its `adjoint`.
 
-    One forward pass carries all parameters side by side and costs about 0.8 of the
-    simulation for each; going backwards costs about 6.5 of it for any number, and twice
+    One forward pass carries all parameters side by side and costs about 0.6 of the
+    simulation for each; going backwards costs about 5 of it for any number, and twice
     the time to compile (`experiments/benchmarks`, gradients).
     """
     return diffrax.ForwardMode() if parameters <= FEW else diffrax.RecursiveCheckpointAdjoint()

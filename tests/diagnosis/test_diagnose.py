@@ -58,7 +58,9 @@ def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
     "name, where_it_shows",
     [
         ("voltage_saturation", "in the second run alone"),
-        ("viscous_friction", "in how far the stated parameters would have to go"),
+        pytest.param(
+            "viscous_friction", "in how far the stated parameters would have to go", marks=pytest.mark.slow
+        ),
         ("joint_flexibility", "between rotor and load"),
     ],
 )
