@@ -96,7 +96,7 @@ def fit(
         return sum(parts[1:], parts[0])
 
     def keep(cost, normal):
-        return cost, normal, vector.copy(), [run.starts.copy() for run in runs]
+        return float(cost), normal, vector.copy(), [run.starts.copy() for run in runs]
 
     def restore(kept):
         vector[:] = kept[2]

@@ -50,9 +50,19 @@ class Candidate:
         return len(self.amplitudes) + sum(name != "transition_rate" for name in self.free)
 
     @property
+    def index(self) -> int:
+        """Index of its joint or link, counted from zero."""
+        return index(self.location)
+
+    @property
     def key(self) -> tuple[str, str]:
         """Effect and location: what a report names."""
         return self.effect, self.location
+
+
+def index(location: str) -> int:
+    """Index of `joint_1`, `link_2` or the like, counted from zero."""
+    return int(location.rpartition("_")[2]) - 1
 
 
 # amplitudes that may have either sign; all others would be unphysical below zero
@@ -85,7 +95,7 @@ def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float])
                 continue
             options = {}
             if "transition_rate" in kind.units:
-                options["transition_rate"] = transition_rates[int(location.rpartition("_")[2]) - 1]
+                options["transition_rate"] = transition_rates[index(location)]
             found.append(kind(0.0, location=location, **options))
     return found
 
@@ -93,7 +103,7 @@ def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float])
 def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> bool:
     if name == "backlash":
         # a joint that may come apart has a coordinate more; see `loose_joint`
-        return arm.joints[int(location.rpartition("_")[2]) - 1].play is not None
+        return arm.joints[index(location)].play is not None
     if name in ("voltage_saturation", "voltage_dead_zone", "winding_heating"):
         return arm.drive == "voltage"
     if name == "torque_constant":
@@ -101,9 +111,9 @@ def _possible(name: str, location: str, arm: Arm, channels: tuple[str, ...]) -> 
     if name in ("payload_mass", "gravity"):
         return bool(arm.links)
     if name in ("root_compliance", "structural_damping", "centrifugal_stiffening"):
-        return arm.links[int(location.rpartition("_")[2]) - 1].modes > 0
+        return arm.links[index(location)].modes > 0
     if name == "joint_flexibility":
-        joint = int(location.rpartition("_")[2]) - 1
+        joint = index(location)
         bends = joint < len(arm.links) and arm.links[joint].modes > 0
         return bends or arm.joints[joint].play is not None
     if name.startswith("sensor_"):
@@ -220,7 +230,7 @@ class Motion:
         kind = EFFECTS[candidate.effect]
         if candidate.location.rpartition("_")[0] != "joint":
             return None
-        joint = int(candidate.location.rpartition("_")[2]) - 1
+        joint = candidate.index
         joints = self.command.shape[2]
         blank = np.zeros((*self.command.shape[:2], joints + self.model.size))
         shape = dict(candidate.shape)

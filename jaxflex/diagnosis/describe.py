@@ -10,54 +10,50 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from ..arm.arm import Arm
 from ..effects import EFFECTS
 from ..effects.base import AbstractSensorEffect
-from ..files.arm_file import ArmFile
 from ..files.units import parameter_unit
 from ..sensors import unit
-from .calibrate import Freedom, fit
+from .calibrate import fit
 from .catalogue import Candidate
+from .departure import departures, is_bent
+from .foretell import AT_FLOOR, Foretold, foretell, noise
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
 from .locate import LatentForce, regimes
 from .next_experiment import advice
-from .prepare import Prepared
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
-from .shooting import Problem, Run
+from .shooting import Problem
+from .study import Study
 
-AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
-HORIZON = HORIZONS[-1]
 
 
 class Nominally(NamedTuple):
-    """What the arm as it was stated misses: forces that it lacks, and errors and predictions of held-out runs."""
+    """What the arm as it was stated misses: the forces that it lacks, and how held-out runs were foretold."""
 
     forces: list[LatentForce]
-    errors: dict[str, float]
-    predictions: list
+    foretold: Foretold
 
 
-def nominally(prepared: Prepared, search: Search, outcome: Outcome) -> Nominally:
-    """What a calibrated arm without any effect misses."""
-    search.restart(outcome.nominal_starts)
-    forces = search.latent(outcome.nominal.fit.vector)
-    return Nominally(forces, *judge(prepared.problem, prepared.held_out, outcome.nominal))
+def nominally(study: Study) -> Nominally:
+    """What the calibrated arm without any effect misses."""
+    nominal = study.outcome.nominal
+    study.search.restart(study.outcome.nominal_starts)
+    forces = study.search.latent(nominal.fit.vector)
+    return Nominally(forces, foretell(study.prepared.problem, study.prepared.held_out, nominal))
 
 
-def describe(
-    file: ArmFile, prepared: Prepared, search: Search, outcome: Outcome, nominal: Nominally, began: float
-) -> Diagnosis:
-    """The diagnosis that an outcome amounts to."""
-    problem, parameters = prepared.problem, search.parameters
-    forces_before, before = nominal.forces, (nominal.errors, nominal.predictions)
+def describe(study: Study, stated: Nominally, began: float) -> Diagnosis:
+    """The diagnosis that an outcome amounts to; `stated`: what the arm misses without it."""
+    search, outcome, parameters = study.search, study.outcome, study.search.parameters
+    before, after = stated.foretold, study.foretold()
     search.restart(outcome.final_starts)
     forces_after = search.latent(outcome.final.fit.vector)
-    after = judge(problem, prepared.held_out, outcome.final)
-    levels = [level(problem, found) for found, _ in (before, after)]
-    gone = (levels[0] - levels[1]) / (levels[0] - 1) if levels[0] > VISIBLE else 0.0
-    final = everything(prepared, search, outcome)
+    gone = (before.level - after.level) / (before.level - 1) if before.level > VISIBLE else 0.0
+    final = everything(study)
     estimates = _estimates(search, final)
     effects = tuple(
         _named(search, final, effect, gain, estimates)
@@ -67,70 +63,32 @@ def describe(
     for place, rival in outcome.rivals:
         candidate = rival.effects[-1]
         alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
-    bent = search.is_bent(final, outcome.explained)
-    verdict = "unexplained" if bent else _verdict(outcome, levels, gone)
-    vector = final.fit.vector
-    arm = parameters.build(jnp.asarray(vector))
-    improved = _with_outside(file, search, arm, outcome.final.effects, vector)
-    comparison = _comparison(prepared, before[1], after[1])
+    bent = is_bent(parameters, final, outcome.explained)
+    verdict = "unexplained" if bent else _verdict(outcome, after.level, gone)
     return Diagnosis(
         verdict=verdict,
         effects=effects,
         alternatives=tuple(alternatives),
-        where=_where(problem, before[0], forces_before, outcome),
+        where=_where(search.problem, before.errors, stated.forces, outcome),
         gap=Gap(
             "root mean square error of predictions over 1 s from estimated starts",
-            True, before[0], after[0], prepared.floor,
+            True, before.errors, after.errors, study.prepared.floor,
         ),
         next_experiment=_next(verdict, search, outcome, forces_after),
         calibrated={part.name: estimates[i] for i, part in enumerate(parameters.nominal)},
-        improved=improved,
+        improved=_improved(study, final.fit.vector),
         explained=float(np.clip(gone, 0.0, 1.0)),
-        notes=(*prepared.notes, *([_bent(search, final)] if bent else [])),
+        notes=(*study.notes, *([_bent(search, final)] if bent else [])),
         seconds=time.perf_counter() - began,
-        forces_before=tuple(forces_before),
+        forces_before=tuple(stated.forces),
         forces_after=tuple(forces_after),
-        comparison=comparison,
+        comparison=_comparison(search.problem, before, after),
     )  # fmt: skip
 
 
-def judge(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> tuple[dict[str, float], list]:
-    """Error of each channel over held-out runs, starts alone fitted; and the predictions."""
-    # the phase of a disturbance is its own in every run
-    free = [
-        problem.setting.parameters.position(*effect.key, name)
-        for effect in hypothesis.effects
-        if effect.effect == "periodic_disturbance"
-        for name in effect.amplitudes
-    ]
-    held = Freedom.full(free)
-    squares, predictions = [], []
-    for run in runs:
-        vector = hypothesis.fit.vector
-        for horizon in HORIZONS:
-            if horizon > HORIZONS[0]:
-                problem.join(run, vector)
-            found = fit(problem, [run], vector, held, horizon, 4)
-            vector = found.vector
-        reading = problem.predict(run, vector).reading
-        lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
-        # a motion that cannot be followed counts as if nothing had been foretold of it
-        reading = np.where(lost, np.mean(run.reading, (0, 1)), reading)
-        error = np.where(run.valid[..., None], run.reading - reading, 0.0)
-        squares.append((error**2).sum((0, 1)) / run.valid.sum())
-        predictions.append((run, reading))
-    rms = np.sqrt(np.mean(squares, 0))
-    return dict(zip(problem.setting.channels, map(float, rms), strict=True)), predictions
-
-
-def level(problem: Problem, errors: dict[str, float]) -> float:
-    """Misfit a reading of what `judge` found, in units of the noise: 1 is the noise floor."""
-    return float(np.mean([(errors[c] / s) ** 2 for c, s in _noise(problem).items()]))
-
-
-def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothesis:
+def everything(study: Study) -> Hypothesis:
     """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
-    final = outcome.final
+    prepared, search, final = study.prepared, study.search, study.outcome.final
     if any(effect.effect == "periodic_disturbance" for effect in final.effects):
         return final
     # the longest horizon over which the model still follows: beyond it, parameters would
@@ -138,7 +96,7 @@ def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothes
     followed = [h for h, cost in final.costs.items() if cost < CLOSE * final.fit.count]
     horizon = max(followed, default=HORIZONS[0])
     runs = [*prepared.calibration, *prepared.held_out]
-    search.restart(outcome.final_starts)
+    search.restart(study.outcome.final_starts)
     free = freedom(search.parameters, final.effects)
     found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
     if not (np.isfinite(found.cost) and np.isfinite(found.normal.matrix).all()):
@@ -146,21 +104,16 @@ def everything(prepared: Prepared, search: Search, outcome: Outcome) -> Hypothes
     return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
 
 
-def _noise(problem: Problem) -> dict[str, float]:
-    s = problem.setting
-    return {c: float(n) for c, n in zip(s.channels, s.noise, strict=True)}
-
-
-def _verdict(outcome: Outcome, levels: list[float], gone: float) -> str:
+def _verdict(outcome: Outcome, left: float, gone: float) -> str:
     if not outcome.final.effects:
-        return "nothing_missing" if levels[1] < AT_FLOOR else "unexplained"
-    if levels[1] > AT_FLOOR and gone < MOSTLY:
+        return "nothing_missing" if left < AT_FLOOR else "unexplained"
+    if left > AT_FLOOR and gone < MOSTLY:
         return "unexplained"
     return "ambiguous" if outcome.rivals else "missing_effect"
 
 
 def _bent(search: Search, final: Hypothesis) -> str:
-    farthest = sorted(search.departures(final).items(), key=lambda item: -abs(item[1]))[:3]
+    farthest = sorted(departures(search.parameters, final).items(), key=lambda item: -abs(item[1]))[:3]
     worst = ", ".join(f"{name} {moved:+.1f}" for name, moved in farthest)
     return (
         f"the arm's own parameters had to leave their stated uncertainty to fit ({worst} standard deviations): "
@@ -216,7 +169,7 @@ def _named(
 def _where(
     problem: Problem, before: dict[str, float], forces: list[LatentForce], outcome: Outcome
 ) -> tuple[Place, ...]:
-    excess = {c: max((before[c] / s) ** 2 - 1, 0.0) for c, s in _noise(problem).items()}
+    excess = {c: max((before[c] / s) ** 2 - 1, 0.0) for c, s in noise(problem).items()}
     total = sum(excess.values())
     if total <= 0:
         return ()
@@ -246,17 +199,17 @@ def _next(verdict: str, search: Search, outcome: Outcome, forces: list[LatentFor
     return "Repeat the run with another payload: the same effect with the same size confirms it."
 
 
-def _with_outside(file: ArmFile, search: Search, arm, effects: tuple[Candidate, ...], vector: np.ndarray):
+def _improved(study: Study, vector: np.ndarray) -> Arm:
     """The calibrated arm with the effects that were found, and no absent ones."""
-    kept = list(file.arm.effects)
-    for effect in effects:
+    parameters, nominal = study.search.parameters, study.file.arm
+    arm = parameters.build(jnp.asarray(vector))
+    kept = list(nominal.effects)
+    for effect in study.outcome.final.effects:
         kind = EFFECTS[effect.effect]
-        values = {
-            field: float(vector[search.parameters.position(*effect.key, field)]) for field in kind.units
-        }
+        values = {field: float(vector[parameters.position(*effect.key, field)]) for field in kind.units}
         kept.append(kind(location=effect.location, **values))
     joints = []
-    for own, given in zip(arm.joints, file.arm.joints, strict=True):
+    for own, given in zip(arm.joints, nominal.joints, strict=True):
         # a winding too fast for the samples is put back
         motor = own.motor
         if motor is not None and motor.inductance is None and given.motor.inductance is not None:
@@ -265,13 +218,12 @@ def _with_outside(file: ArmFile, search: Search, arm, effects: tuple[Candidate, 
     return dataclasses.replace(arm, joints=tuple(joints), effects=tuple(kept))
 
 
-def _comparison(prepared: Prepared, before: list, after: list) -> Comparison:
-    run, first = before[0]
-    _, second = after[0]
+def _comparison(problem: Problem, before: Foretold, after: Foretold) -> Comparison:
+    run, first = before.predictions[0]
+    _, second = after.predictions[0]
     count = len(run.times)
-    channels = prepared.problem.setting.channels
 
     def flat(values):
-        return {name: values[..., i].ravel()[:count] for i, name in enumerate(channels)}
+        return {name: values[..., i].ravel()[:count] for i, name in enumerate(problem.setting.channels)}
 
     return Comparison(run.times, flat(run.reading), flat(first), flat(second))

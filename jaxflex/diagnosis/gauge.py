@@ -10,6 +10,10 @@ import dataclasses
 from ..files.arm_file import ArmFile
 
 MODES = 3  # that a gauge shows
+BY_GAUGE = (
+    "the tip's deflection is followed far better as what a strain gauge at the root shows, scaled under a weight "
+    "at the tip (deflection_from = 'gauge'); at high frequencies the two differ"
+)
 
 
 def by_gauge(file: ArmFile) -> ArmFile | None:

@@ -7,9 +7,8 @@ import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
-from ..effects import EFFECTS, AbstractBodyEffect, AbstractDryFriction, SensorGain, TorqueConstant
+from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
 from .calibrate import Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
@@ -22,15 +21,12 @@ HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # missing effect: gains below this share of the readings, times the horizon, count as that.
 MODEL_ERROR = 0.002
 TRUSTED = 2.5  # standard deviations up to which a nominal parameter may leave its value freely
+STRONG = 3.0  # times the allowance: a candidate worth a full fit, and a gain worth an effect
+FAIR = 1.5  # misfit a reading over a second, in units of the noise, that leaves nothing to explain
+LITTLE = 0.01  # of the gap there was: what may be left over a second where a tenth of one is followed
 CLOSE = 2.0  # misfit a reading up to which a fit is close enough to trust, and to climb from
 CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
-SUSPECT = (
-    0.99  # of arms as they were stated, the share whose parameters depart less: beyond it parts are tried
-)
-BENT = 0.999  # the same, beyond which something is missing
-FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
-FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 RIVAL = 0.9  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
 FORM = 0.01  # of what an effect explains: what another form of it would explain better
@@ -74,6 +70,11 @@ class Hypothesis:
             ),
             default=-np.inf,
         )
+
+    def gain(self, other: "Hypothesis") -> float:
+        """Fall of the cost against another at the longest horizon that both were fitted over."""
+        horizon = max(self.costs.keys() & other.costs.keys())
+        return other.costs[horizon] - self.costs[horizon]
 
 
 @dataclass(frozen=True)
@@ -200,50 +201,6 @@ class Search:
         self.restart(starts)
         return level
 
-    @property
-    def stated(self) -> int:
-        """Number of parameters of the arm that are stated, 1 at least."""
-        return max(sum(not part.is_of_contact for part in self.parameters.nominal), 1)
-
-    def departures(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """How far each stated parameter of the arm went, in standard deviations."""
-        return {
-            part.name: float(hypothesis.fit.vector[i])
-            for i, part in enumerate(self.parameters.nominal)
-            if not part.is_of_contact
-        }
-
-    def departure(self, hypothesis: Hypothesis) -> float:
-        """How far the nominal parameters went, root mean square, in standard deviations.
-
-        Where nothing else is left, a share of what the farthest of them went counts too: one among
-        many may have made up for what is missing.
-        """
-        moved = np.abs(list(self.departures(hypothesis).values()))
-        farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
-        return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
-
-    def usual(self, share: float) -> float:
-        """The departure that this share of arms stays below whose parameters are as uncertain as stated."""
-        return float(np.sqrt(chi2.ppf(share, self.stated) / self.stated))
-
-    def is_suspect(self, hypothesis: Hypothesis) -> bool:
-        """True if the nominal parameters went far enough to imitate a part of the arm that is not as stated."""
-        return self.departure(hypothesis) > self.usual(SUSPECT)
-
-    def is_bent(self, hypothesis: Hypothesis, explained: float) -> bool:
-        """True if the nominal parameters went farther than anything but something missing makes them go.
-
-        `explained`: the cost that the effects account for. No law of friction or contact is the true
-        one, and parameters make up for its error as far as that may reach.
-        """
-        touches = any(
-            issubclass(EFFECTS[effect.effect], AbstractDryFriction) or self.is_of_loose_joint(effect)
-            for effect in hypothesis.effects
-        )
-        error = FORM_ERROR**2 * max(explained, 0.0) if touches else 0.0
-        return bool(self.departure(hypothesis) > np.hypot(self.usual(BENT), np.sqrt(error / self.stated)))
-
     def latent(self, vector: np.ndarray, horizon: int = HORIZONS[-1]) -> list[LatentForce]:
         """The forces that would make the model fit the first run."""
         return latent_forces(self.problem, self.runs[0], vector, horizon)
@@ -318,7 +275,7 @@ class Search:
         nothing = (0.0,) * len(part.amplitudes)
         if part.effect != "hub_inertia":
             return [nothing]
-        felt = 1 / self.parameters.lightness[int(part.location.rpartition("_")[2]) - 1]  # kg m^2
+        felt = 1 / self.parameters.lightness[part.index]  # kg m^2
         return [nothing, *((share * felt,) for share in HUBS)]
 
     def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
@@ -339,12 +296,6 @@ class Search:
             if item.candidate.key != effect.key
             and item.gain > (RIVAL if item.candidate.count <= effect.count else 1.0) * own
         ]
-
-    def is_of_loose_joint(self, effect: Candidate) -> bool:
-        """True of what the arm of this problem was taken apart for."""
-        if effect.effect not in ("backlash", "joint_flexibility"):
-            return False
-        return self.parameters.arm.joints[int(effect.location.rpartition("_")[2]) - 1].play is not None
 
     def sensible(self, found: Hypothesis) -> bool:
         """False if the effect added last came to a size that makes no sense."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .catalogue import Motion
+from .catalogue import Motion, index
 from .normal import solve
 from .shooting import LOST, Linearised, Problem, Run
 
@@ -71,7 +71,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
     for e, (name, unit, _) in enumerate(places):
         part = slice(e * blocks, (e + 1) * blocks)
         values, evidence = _estimate(problem, run, linear, part, horizon)
-        joint = min(int(name.rpartition("_")[2]) - 1, joints - 1)
+        joint = min(index(name), joints - 1)
         middle = [(a + b) // 2 for a, b in itertools.pairwise(edges)]
         angle = motion.angle(joint).mean(0)[:, middle].ravel()
         rate = motion.rate(joint).mean(0)[:, middle].ravel()

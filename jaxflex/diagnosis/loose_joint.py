@@ -7,7 +7,7 @@ nothing else explains what was measured.
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .hypothesis import Hypothesis, Search, adopt, freedom
 from .parameters import Parameters
-from .prepare import Prepared, make_problem
+from .study import Say, Study
 
 GUESSES = {  # of CONTACT: value, and relative uncertainty
     "contact_stiffness": (100.0, 0.5),  # N m/rad
@@ -49,16 +49,16 @@ def trials(joint: int) -> list[tuple[Candidate, float]]:
 
 
 def loose_joints(
-    file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Callable[[str], None]
-) -> "list[tuple[Prepared, Search, Hypothesis]]":
+    file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Say
+) -> list[tuple[Study, Hypothesis]]:
     """For every joint, the best of its trials over the shortest horizon."""
     found = []
     for joint, own in enumerate(file.arm.joints):
         lumped = any(getattr(link, "model", "") == "lumped" for link in file.arm.links[joint : joint + 1])
         if lumped or own.play is not None:
             continue
-        prepared = make_problem(loosened(file, joint), recordings, divided)
-        search = Search(prepared.problem, prepared.calibration, say)
+        study = Study(loosened(file, joint), recordings, divided, say)
+        search = study.search
         straight = search.settle(search.parameters.start)
         places = [(straight.vector, search.starts())]
         bent = search.climb((), straight.vector, to=1)
@@ -75,15 +75,22 @@ def loose_joints(
         for _, _, candidate, vector, starts in sorted(tried)[:FITTED]:
             search.restart(starts)
             contact = contact_columns(search.parameters, candidate)
-            close = fit(prepared.problem, search.runs, vector, contact, 1, 2).vector
+            close = fit(search.problem, search.runs, vector, contact, 1, 2).vector
             fitted = search.climb((candidate,), close, to=1, iterations=8)
             say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             if best is None or fitted.fit.cost < best[0].fit.cost:
                 best = fitted, search.starts()
         assert best is not None
         search.restart(best[1])
-        found.append((prepared, search, best[0]))
+        found.append((study, best[0]))
     return found
+
+
+def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:
+    """True of what the arm of these parameters was taken apart for."""
+    if effect.effect not in ("backlash", "joint_flexibility"):
+        return False
+    return parameters.arm.joints[effect.index].play is not None
 
 
 def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:

@@ -1,0 +1,67 @@
+"""How far the arm's stated parameters had to go, and whether that speaks of something missing.
+
+Parameters as uncertain as stated depart from their values as the square root of chi squared over their
+number. What departs farther than nearly all such arms has made up for something.
+"""
+
+import numpy as np
+from scipy.stats import chi2
+
+from ..effects import EFFECTS, AbstractDryFriction
+from .hypothesis import CLOSE, Hypothesis
+from .loose_joint import is_of_loose_joint
+from .parameters import Parameters
+
+SUSPECT = 0.99  # of arms as stated, the share whose parameters depart less: beyond it parts are tried
+BENT = 0.999  # the same, beyond which something is missing
+FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
+FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
+
+
+def departures(parameters: Parameters, hypothesis: Hypothesis) -> dict[str, float]:
+    """How far each stated parameter of the arm went, in standard deviations."""
+    return {
+        part.name: float(moved)
+        for part, moved in zip(parameters.nominal, hypothesis.fit.vector, strict=False)
+        if not part.is_of_contact
+    }
+
+
+def departure(parameters: Parameters, hypothesis: Hypothesis) -> float:
+    """How far the stated parameters went, root mean square, in standard deviations.
+
+    Where nothing else is left, a share of what the farthest of them went counts too: one among
+    many may have made up for what is missing.
+    """
+    moved = np.abs(list(departures(parameters, hypothesis).values()))
+    farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
+    return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
+
+
+def is_suspect(parameters: Parameters, hypothesis: Hypothesis) -> bool:
+    """True if the parameters went far enough to imitate a part of the arm that is not as stated."""
+    return departure(parameters, hypothesis) > _usual(SUSPECT, _stated(parameters))
+
+
+def is_bent(parameters: Parameters, hypothesis: Hypothesis, explained: float) -> bool:
+    """True if the parameters went farther than anything but something missing makes them go.
+
+    `explained`: the cost that the effects account for. No law of friction or contact is the true
+    one, and parameters make up for its error as far as that may reach.
+    """
+    touches = any(
+        issubclass(EFFECTS[effect.effect], AbstractDryFriction) or is_of_loose_joint(parameters, effect)
+        for effect in hypothesis.effects
+    )
+    stated = _stated(parameters)
+    error = FORM_ERROR**2 * max(explained, 0.0) if touches else 0.0
+    return bool(departure(parameters, hypothesis) > np.hypot(_usual(BENT, stated), np.sqrt(error / stated)))
+
+
+def _stated(parameters: Parameters) -> int:
+    return max(sum(not part.is_of_contact for part in parameters.nominal), 1)
+
+
+def _usual(share: float, stated: int) -> float:
+    """The departure that this share of arms stays below."""
+    return float(np.sqrt(chi2.ppf(share, stated) / stated))

@@ -1,0 +1,185 @@
+"""The search: effects are added one at a time until nothing in the catalogue stands out."""
+
+from ..effects import EFFECTS
+from .departure import is_suspect
+from .hypothesis import (
+    CHANCE,
+    CLOSE,
+    FAIR,
+    HORIZONS,
+    LITTLE,
+    PARTS,
+    STRONG,
+    Hypothesis,
+    Outcome,
+    Ranked,
+    Search,
+    Starts,
+)
+from .rivals import prune
+
+MOST_EFFECTS = 5
+SHORT_LIST = 3
+NEAR = 0.5  # of the strongest: rivals below it are not fitted
+SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
+HALF = 0.3  # of a larger one that an effect has to explain
+LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
+FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
+HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
+
+Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
+
+
+def find(search: Search, start: Hypothesis | None = None) -> Outcome:
+    """Add effects one at a time until nothing in the catalogue stands out.
+
+    `start`: the first of them is settled already, with the pieces starting where they are.
+    """
+    say = search.say
+    begin = search.starts()
+    settled = search.settle(search.parameters.start)
+    base, base_starts = Hypothesis((), settled, 1, {1: settled.cost}), search.starts()
+    outcome: Outcome | None = None
+    levels: list[float] = []
+    for _ in range(MOST_EFFECTS + 1):
+        search.restart(base_starts)
+        fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
+        starts = search.starts()
+        say(
+            f"calibrated with {len(base.effects)} effect(s): misfit {fitted.fit.level:.3g} of the noise floor"
+        )
+        if outcome is None:
+            outcome = Outcome(fitted, starts)
+        outcome.final, outcome.final_starts = fitted, starts
+        levels.append(search.over_a_second(fitted))
+        outcome.nominal_level, outcome.level = levels[0], levels[-1]
+        if start is not None and not fitted.effects:
+            base, base_starts = start, begin
+            continue
+        short = outcome.nominal.costs[HORIZONS[0]] - fitted.costs[HORIZONS[0]]
+        long = (levels[0] - levels[-1]) * fitted.fit.count
+        explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
+        near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
+        suspect = start is None and is_suspect(search.parameters, fitted)
+        if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not suspect:
+            break
+        horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
+        ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
+        far = fitted.fit.level > CLOSE and fitted.horizon == HORIZONS[0]
+        if far:
+            # a fit that the missing effect has bent is a poor place to judge from: the
+            # parameters as they were before it are judged as well, over the shortest horizon
+            search.restart(base_starts)
+            ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
+        tried = _short_list(ranked)
+        if len(fitted.effects) == MOST_EFFECTS or not (tried or suspect):
+            break
+        before, before_starts = (base, base_starts) if far else (fitted, starts)
+        confirmed: list[Confirmed] = []
+
+        def confirm(items, before, before_starts, fitted=fitted, explained=explained, confirmed=confirmed):
+            for item in items:
+                found = search.confirm(before, before_starts, item, fitted.horizon)
+                say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+                if search.sensible(found):
+                    confirmed.append((found.strength(fitted, explained), found, search.starts()))
+
+        confirm(tried, before, before_starts)
+        if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
+            search.restart(base_starts)
+            straight, straight_starts = straightened(search, base)
+            parts = sift(search, straight, straight_starts, search.parts(straight.effects))
+            confirm(parts, straight, straight_starts)
+        confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
+        if not confirmed:
+            break
+        strength, best, best_starts = simplest(search, confirmed)
+        straightens = (
+            suspect and not is_suspect(search.parameters, best) and best.gain(fitted) > STRONG * CHANCE
+        )
+        if not (strength > STRONG or straightens):
+            break
+        base, base_starts = best, best_starts
+    assert outcome is not None
+    search.restart(outcome.final_starts)
+    prune(search, outcome)
+    return outcome
+
+
+def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
+    """True if no part of the arm need be tried beside what was found best.
+
+    Either nothing is left; or much is, which bends all parameters, and most of it has gone.
+    """
+    if issubclass(EFFECTS[best.effects[-1].effect], PARTS):
+        return False  # another part of the arm could be meant
+    if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
+        return True
+    return best.fit.level < FAIR and not is_suspect(search.parameters, best)
+
+
+def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
+    """The hypothesis with the nominal parameters where they were stated, the starts settled."""
+    vector = base.fit.vector.copy()
+    vector[: len(search.parameters.nominal)] = 0.0
+    settled = search.settle(vector)
+    return Hypothesis(base.effects, settled, 1, {1: settled.cost}), search.starts()
+
+
+def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) -> list[Ranked]:
+    """The few that explain most over the shortest horizon, each fitted in full.
+
+    Parameters that were bent to imitate an effect mislead a test to first order.
+    """
+    best: dict[tuple[str, str], tuple[float, Ranked]] = {}
+    for item in items:
+        cost = search.confirm(base, starts, item, HORIZONS[0]).fit.cost
+        if item.candidate.key not in best or cost < best[item.candidate.key][0]:
+            best[item.candidate.key] = cost, item
+    return [item for _, item in sorted(best.values(), key=lambda entry: entry[0])][:SHORT_LIST]
+
+
+def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
+    """False for an effect that leaves most of a misfit that is clearly there."""
+    horizon = max(before.costs.keys() & after.costs.keys())
+    count = before.fit.count
+    left, gone = before.costs[horizon] / count - 1, (before.costs[horizon] - after.costs[horizon]) / count
+    return left < SMALL or gone > HALF * left
+
+
+def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
+    """Of the hypotheses that explain practically the same, the one with the fewest parameters.
+
+    Unless one of the others follows clearly better for longer than they were fitted.
+    """
+    most = max(strength for strength, _, _ in confirmed)
+    tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
+    tied.sort(key=lambda entry: (entry[1].effects[-1].count, -entry[0]))
+
+    def followed(entry: Confirmed) -> Hypothesis:
+        search.restart(entry[2])
+        return search.climb(entry[1].effects, entry[1].fit.vector, ceiling=CLOSE)
+
+    chosen = tied[0]
+    further = followed(chosen) if len(tied) > 1 and chosen[1].horizon < HORIZONS[-1] else None
+    if further is not None and further.fit.level > FAIR:
+        for entry in tied[1:]:
+            other = followed(entry)
+            if other.strength(further) > STRONG and _worth_it(further, other):
+                chosen, further = entry, other
+    return chosen
+
+
+def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:
+    """Both rankings, each candidate once, the first ranking's best before the second's."""
+    best = {}
+    for item in (*first, *second):
+        key = item.candidate.key
+        if key not in best or item.strength > best[key].strength:
+            best[key] = item
+    return sorted(best.values(), key=lambda item: -item.strength)
+
+
+def _short_list(ranked: list[Ranked]) -> list[Ranked]:
+    strong = [item for item in ranked if item.strength > STRONG]
+    return [item for item in strong if item.strength > NEAR * strong[0].strength][:SHORT_LIST]

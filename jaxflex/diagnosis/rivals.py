@@ -1,0 +1,66 @@
+"""What each effect that was found is worth: is it needed still, and would another one do?"""
+
+import dataclasses
+
+import numpy as np
+
+from .hypothesis import CLOSE, STRONG, Outcome, Search, allowance, without
+from .loose_joint import is_of_loose_joint
+
+TIE = 0.05  # of the gain: rivals nearer than this are not told apart
+
+
+def prune(search: Search, outcome: Outcome) -> None:
+    """Drop every effect that a later one made needless; note what each of the others is worth."""
+    gains: dict[tuple[str, str], float] = {}
+    for effect in list(outcome.final.effects):
+        if len(outcome.final.effects) == 1:
+            gains[effect.key] = outcome.final.gain(outcome.nominal)
+            continue
+        search.restart(outcome.final_starts)
+        rest = tuple(e for e in outcome.final.effects if e is not effect)
+        vector = without(search.parameters, outcome.final.fit.vector, effect)
+        found = search.climb(rest, vector, ceiling=CLOSE, iterations=3)
+        if found.horizon == outcome.final.horizon and outcome.final.strength(found) < STRONG:
+            search.say(f"{effect.effect} at {effect.location} is no longer needed")
+            outcome.final, outcome.final_starts = found, search.starts()
+        else:
+            gains[effect.key] = outcome.final.gain(found)
+    search.restart(outcome.final_starts)
+    outcome.gains = [gains.get(effect.key, np.inf) for effect in outcome.final.effects]
+
+
+def weigh(search: Search, outcome: Outcome) -> None:
+    """Find the rivals that explain as much as an effect that was added.
+
+    One that explains more, or as much with fewer parameters, takes its place.
+    """
+    for place, effect in enumerate(outcome.final.effects):
+        final, starts = outcome.final, outcome.final_starts
+        rest = tuple(e for e in final.effects if e is not effect)
+        search.restart(starts)
+        found = search.rivals(final, effect)
+        for item, share in found[:2]:
+            vector = without(search.parameters, final.fit.vector, effect)
+            base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
+            rival = search.confirm(base, starts, item, final.horizon)
+            if rival.horizon != final.horizon or not search.sensible(rival):
+                continue
+            lost = final.gain(rival)
+            same = lost < TIE * share and final.strength(rival) < 1.0
+            better = -lost > STRONG * allowance(final.fit.count, final.horizon)
+            simpler = same and item.candidate.count < effect.count
+            if (better or simpler) and not is_of_loose_joint(search.parameters, effect):
+                search.say(
+                    f"{item.candidate.effect} at {item.candidate.location} in place of {effect.effect}"
+                )
+                order = (*rest[:place], item.candidate, *rest[place:])
+                outcome.final, outcome.final_starts = (
+                    dataclasses.replace(rival, effects=order),
+                    search.starts(),
+                )
+                outcome.rivals = [entry for entry in outcome.rivals if entry[0] != place]
+                break
+            if same:
+                outcome.rivals.append((place, rival))
+    search.restart(outcome.final_starts)
