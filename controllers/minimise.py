@@ -15,6 +15,7 @@ from jaxflex import Scalar, value_and_gradient
 
 Free = Float[Array, " free"]
 Starts = Float[Array, "starts free"]
+OPTIONS = {"autodiff_mode": "fwd"}
 
 
 class Minimum(NamedTuple):
@@ -45,65 +46,66 @@ class Stepper(eqx.Module):
     minimiser: optx.AbstractMinimiser
 
 
-def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
-    """`objective`, its derivative computed together with it, in the mode that suits their number.
+def known(cost: Scalar, gradient: Free, aux: PyTree):
+    """A function for a minimiser that asks for one point only, of which cost and gradient are known already.
 
-    A minimiser that linearises its function then runs the simulation once a step. What
-    the objective returns beside its cost has no derivative.
+    A minimiser differentiates its function itself; a simulation is then traced through layers
+    of transformations that it has no need of, which took as long again.
     """
 
-    def call(free, args):
-        @jax.custom_jvp
-        def of(free):
-            return objective(free, args)
+    @jax.custom_jvp
+    def of(free):
+        return cost, aux
 
-        @of.defjvp
-        def _(primals, tangents):
-            (value, aux), gradient = value_and_gradient(lambda x: objective(x, args), has_aux=True)(
-                primals[0]
-            )
-            nothing = jax.tree_util.tree_map(jnp.zeros_like, aux)
-            return (value, aux), (jnp.dot(gradient, tangents[0]), nothing)
+    @of.defjvp
+    def _(primals, tangents):
+        nothing = jax.tree_util.tree_map(jnp.zeros_like, aux)
+        return (cost, aux), (jnp.dot(gradient, tangents[0]), nothing)
 
-        return of(free)
-
-    return call
+    return lambda free, args: of(free)
 
 
 def _start(stepper: Stepper, free: Free, args: PyTree):
     cost, aux = eqx.filter_eval_shape(stepper.objective, free, args)
-    options = {"autodiff_mode": "fwd"}
-    fn = with_gradient(stepper.objective)
-    return stepper.minimiser.init(fn, free, args, options, cost, aux, frozenset())
+    return stepper.minimiser.init(stepper.objective, free, args, OPTIONS, cost, aux, frozenset())
 
 
 def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
     """One step: the point it judged, with its cost and aux, and where it goes on from."""
-    options = {"autodiff_mode": "fwd"}
-    fn = with_gradient(stepper.objective)
     minimiser = stepper.minimiser
-    after, new, aux = minimiser.step(fn, free, args, options, state, frozenset())
-    done, result = minimiser.terminate(fn, after, args, options, new, frozenset())
+    judged = getattr(state, "y_eval", free)  # quasi-Newton: a step ahead of the last point accepted
+    (cost, aux), gradient = value_and_gradient(lambda x: stepper.objective(x, args), has_aux=True)(judged)
+    fn = known(cost, gradient, aux)
+    after, new, last_aux = minimiser.step(fn, free, args, OPTIONS, state, frozenset())
+    done, result = minimiser.terminate(fn, after, args, OPTIONS, new, frozenset())
     if hasattr(new, "f_info"):  # quasi-Newton: it returns the last point accepted
-        judged = after, new.f_info.f, new.aux
+        best = after, new.f_info.f, new.aux
     elif hasattr(new, "f"):  # optax: it returns the next point, not judged yet
-        judged = free, new.f, aux
+        best = free, new.f, last_aux
     else:
         raise TypeError(
             f"minimise: {type(minimiser).__name__} does not say what its points cost; give BFGS, LBFGS, "
             "another quasi-Newton minimiser of optimistix, or an OptaxMinimiser."
         )
-    return judged, after, new, done, result == optx.RESULTS.successful
+    return best, after, new, done, result == optx.RESULTS.successful
 
 
 @eqx.filter_jit
 def _start_all(stepper: Stepper, free: Starts, args: PyTree, own: PyTree):
-    return eqx.filter_vmap(lambda x, o: _start(stepper, x, (args, o)))(free, own)
+    return _each(lambda x, o: _start(stepper, x, (args, o)), free, own)
 
 
 @eqx.filter_jit
 def _step_all(stepper: Stepper, free: Starts, state: PyTree, args: PyTree, own: PyTree):
-    return eqx.filter_vmap(lambda x, s, o: _step(stepper, x, s, (args, o)))(free, state, own)
+    return _each(lambda x, s, o: _step(stepper, x, s, (args, o)), free, state, own)
+
+
+def _each(function: Callable, free: Starts, *rest: PyTree) -> PyTree:
+    """`function` of every row; of a single one without the layer of `vmap`, which takes long to trace."""
+    if free.shape[0] > 1:
+        return eqx.filter_vmap(function)(free, *rest)
+    row = jax.tree_util.tree_map(lambda x: x[0] if eqx.is_array(x) else x, (free, *rest))
+    return jax.tree_util.tree_map(lambda x: x[None] if eqx.is_array(x) else x, function(*row))
 
 
 def minimise(

@@ -9,7 +9,6 @@ import numpy as np
 
 import controllers as ctl
 import jaxflex as jf
-from controllers.minimise import with_gradient
 from controllers.tuning import lagrangian, scattered
 
 PENALTY = 600.0
@@ -30,11 +29,10 @@ class Counter:
         args = ((problem, first), (jnp.zeros(()), jnp.asarray(PENALTY)))
         centre = problem.free(first)
         args = (args[0], (jnp.zeros(jax.eval_shape(lambda p: _row(p, args), centre).shape), args[1][1]))
-        cost = with_gradient(lagrangian)
         self.centre, self.batch, self.size = np.asarray(centre), batch, centre.shape[0]
         self._one = jax.jit(lambda x: lagrangian(x, args)[0])
         self._many = jax.jit(jax.vmap(lambda x: lagrangian(x, args)[0]))
-        self._both = jax.jit(jax.value_and_grad(lambda x: cost(x, args)[0]))
+        self._both = jax.jit(jf.value_and_gradient(lambda x: lagrangian(x, args)[0]))
         began = time.process_time()
         jax.block_until_ready((self._one(centre), self._both(centre)))
         self.compile_one = time.process_time() - began

@@ -32,7 +32,7 @@ from controllers import (
     unshaped_design,
     varied,
 )
-from controllers.minimise import Stepper, minimise, with_gradient
+from controllers.minimise import Stepper, minimise
 from controllers.pareto import at_pace
 from jaxflex import margins
 
@@ -106,8 +106,8 @@ def test_gradient_of_the_cost_matches_finite_differences(problem):
         found = problem.outcome(problem.values(x, first))
         return found.cost, found.excess
 
-    judged = with_gradient(of_free)
-    (value, excess), slope = jax.jit(jax.value_and_grad(lambda x: judged(x, None), has_aux=True))(free)
+    judged = jf.value_and_gradient(lambda x: of_free(x, None), has_aux=True)
+    (value, excess), slope = jax.jit(judged)(free)
     f = jax.jit(lambda x: of_free(x, None)[0])
     np.testing.assert_allclose(f(free), value, rtol=1e-6)
     assert set(excess) == {"voltage_1", "deflection_1"}
