@@ -19,7 +19,7 @@ from .calibrate import fit
 from .catalogue import Candidate
 from .departure import departures, is_bent
 from .foretell import AT_FLOOR, Foretold, foretell, noise
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
 from .locate import LatentForce, regimes
 from .next_experiment import advice
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
@@ -97,9 +97,10 @@ def everything(study: Study) -> Hypothesis:
     horizon = max(followed, default=HORIZONS[0])
     runs = [*prepared.calibration, *prepared.held_out]
     search.restart(study.outcome.final_starts)
+    restart(prepared.held_out, study.foretold().starts)
     free = freedom(search.parameters, final.effects)
     found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
-    if not (np.isfinite(found.cost) and np.isfinite(found.normal.matrix).all()):
+    if not found.level < max(CLOSE, 2 * final.fit.level) or not np.isfinite(found.normal.matrix).all():
         return final  # a run held out cannot be followed
     return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .calibrate import Freedom, fit
-from .hypothesis import HORIZONS, Hypothesis
+from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
 from .shooting import Problem, Run
 
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
@@ -17,12 +17,13 @@ AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing i
 class Foretold(NamedTuple):
     """Errors by channel, root mean square; every run with its readings as predicted; misfit a reading.
 
-    The `level` is in units of the noise, so 1 is the noise floor.
+    The `level` is in units of the noise, so 1 is the noise floor; `starts` are those that were fitted.
     """
 
     errors: dict[str, float]
     predictions: list[tuple[Run, np.ndarray]]
     level: float
+    starts: Starts
 
 
 def noise(problem: Problem) -> dict[str, float]:
@@ -59,4 +60,4 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
     rms = np.sqrt(np.mean(squares, 0))
     errors = dict(zip(problem.setting.channels, map(float, rms), strict=True))
     level = float(np.mean([(errors[c] / s) ** 2 for c, s in noise(problem).items()]))
-    return Foretold(errors, predictions, level)
+    return Foretold(errors, predictions, level, starts_of(runs))

@@ -145,6 +145,17 @@ def without(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> np
     return vector
 
 
+def starts_of(runs: list[Run]) -> Starts:
+    """The starts of all pieces of these runs, with the slopes there."""
+    return [(run.starts.copy(), run.slopes) for run in runs]
+
+
+def restart(runs: list[Run], starts: Starts) -> None:
+    """Back to what `starts_of` gave."""
+    for run, (kept, slopes) in zip(runs, starts, strict=True):
+        run.starts, run.slopes = kept.copy(), slopes
+
+
 class Search:
     """Fits hypotheses to runs and ranks what each one misses."""
 
@@ -156,12 +167,11 @@ class Search:
 
     def starts(self) -> Starts:
         """The starts of all pieces, with the slopes there, to come back to."""
-        return [(run.starts.copy(), run.slopes) for run in self.runs]
+        return starts_of(self.runs)
 
     def restart(self, starts: Starts) -> None:
         """Back to these starts."""
-        for run, (kept, slopes) in zip(self.runs, starts, strict=True):
-            run.starts, run.slopes = kept.copy(), slopes
+        restart(self.runs, starts)
 
     def settle(self, vector: np.ndarray, horizon: int = 1) -> Fit:
         """The starts alone, parameters held."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -12,9 +13,12 @@ import jaxflex as jf
 from controllers import Replayed, Step
 from experiments.blind.make import make_cases, write_case
 from jaxflex.diagnosis import diagnose
+from jaxflex.diagnosis.describe import everything
 from jaxflex.diagnosis.gauge import by_gauge
-from jaxflex.diagnosis.hypothesis import Search
+from jaxflex.diagnosis.hypothesis import Outcome, Search
+from jaxflex.diagnosis.parameters import _nominal
 from jaxflex.diagnosis.prepare import make_problem
+from jaxflex.diagnosis.study import Study
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 
@@ -50,8 +54,26 @@ def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
         for key, value in truth.items():
             estimate = first.parameters[key]
             assert abs(estimate.value - value) < max(3 * estimate.std, 0.1 * abs(value))
+    for part in _nominal(jf.read_arm_file(folder / "arm.toml")):
+        moved = math.log(found.calibrated[part.name].value / part.value)
+        assert abs(moved) < 4 * part.spread, f"{part.name} left its stated uncertainty"
     json.dumps(found.to_json())
     assert [e.name for e in found.improved.effects] == [e.name for e in found.effects]
+
+
+def test_parameters_do_not_depend_on_what_was_foretold_before(hidden):
+    folder, _ = hidden["nothing"]
+    recordings = [jf.read_recording(path) for path in sorted(folder.glob("run_*.csv"))]
+    study = Study(jf.read_arm_file(folder / "arm.toml"), recordings, False, lambda line: None)
+    search = study.search
+    study.outcome = Outcome(search.climb((), search.parameters.start, to=1), search.starts())
+    study.foretold()
+    ends = []
+    for run in (None, *study.prepared.held_out):
+        if run is not None:
+            run.starts = run.starts + 1.0  # as a hypothesis that cannot follow leaves them
+        ends.append(everything(study).fit.vector)
+    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(
