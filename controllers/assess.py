@@ -14,6 +14,7 @@ from jaxflex import (
     InitialState,
     Trajectory,
     electrical_energy,
+    kept,
     overshoot,
     peak,
     residual_vibration,
@@ -105,7 +106,7 @@ def assessed_channels(arm: Arm) -> list[str]:
     return [*names, f"tip_acceleration_{len(arm.links)}"] if arm.links else names
 
 
-@eqx.filter_jit
+@kept
 def assess(designs: Design, arms: Arm, times: Float[Array, " times"]) -> tuple[Assessment, Trajectory]:
     """Every design of a batch on every arm of a batch; leading axes design, arm."""
 

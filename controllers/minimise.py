@@ -11,7 +11,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float, PyTree
 
-from jaxflex import Scalar, value_and_gradient
+from jaxflex import Scalar, kept, value_and_gradient
 
 Free = Float[Array, " free"]
 Starts = Float[Array, "starts free"]
@@ -90,12 +90,12 @@ def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
     return best, after, new, done, result == optx.RESULTS.successful
 
 
-@eqx.filter_jit
+@kept
 def _start_all(stepper: Stepper, free: Starts, args: PyTree, own: PyTree):
     return _each(lambda x, o: _start(stepper, x, (args, o)), free, own)
 
 
-@eqx.filter_jit
+@kept
 def _step_all(stepper: Stepper, free: Starts, state: PyTree, args: PyTree, own: PyTree):
     return _each(lambda x, s, o: _step(stepper, x, s, (args, o)), free, state, own)
 

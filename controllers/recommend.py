@@ -3,12 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxflex import MeasuredMode
+from jaxflex import MeasuredMode, kept
 
 from .shapers import SHAPERS, Shaper, convolve, residual_ratio, si, simultaneous, zv, zvd
 
@@ -52,7 +51,7 @@ class Rated(NamedTuple):
     call: str
 
 
-@eqx.filter_jit
+@kept
 def _worst(shaper: Shaper, frequency: Float[Array, "2"], damping_ratio: Float[Array, "2"]) -> Array:
     """The largest residual over a rectangle of frequencies [Hz] and damping ratios."""
     f = jnp.linspace(frequency[0], frequency[1], GRID[0])

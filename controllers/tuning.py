@@ -151,8 +151,10 @@ def tune(
     points = scattered(problem.free(first), starts, seed)
     stepper = Stepper(lagrangian, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4))
     args = (problem, first)
-    probe = eqx.filter_eval_shape(lagrangian, points[0], (args, (jnp.zeros(()), jnp.ones(()))))
-    count = probe[1][1].shape[0]
+    count = 1  # with one round multipliers stay zero, and one stands for all
+    if rounds > 1:
+        probe = eqx.filter_eval_shape(lagrangian, points[0], (args, (jnp.zeros(()), jnp.ones(()))))
+        count = probe[1][1].shape[0]
     together = min(together, starts, descents)
 
     def fresh(size):

@@ -82,10 +82,11 @@ from .files.prepare import require_channels as require_channels
 from .files.read_recording import read_recording as read_recording
 from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
-from .motor import DCMotor as DCMotor
-from .motor import MotorAxis as MotorAxis
 
 # Programs that run once
+from .kept import kept as kept
+from .motor import DCMotor as DCMotor
+from .motor import MotorAxis as MotorAxis
 from .one_off import one_off as one_off
 
 # Scalars and sensors

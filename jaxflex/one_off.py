@@ -9,6 +9,8 @@ import jax
 import jax.tree_util as jtu
 from jax.core import Tracer, eval_context
 
+from .kept import kept
+
 # XLA's newer code generator for the CPU makes code no faster here, and takes a quarter longer; the
 # option to do without it is there for a time, and an option that XLA does not know is an error
 OLD_EMITTERS = jax.__version_info__ < (0, 11)
@@ -24,7 +26,7 @@ def one_off(function: Callable) -> Callable:
 
     Of traced values it is a part of the program that is being traced, and compiled as that is.
     """
-    inner, outermost = eqx.filter_jit(function), eqx.filter_jit(function, compiler_options=HASTY)  # pyright: ignore
+    inner, outermost = eqx.filter_jit(function), kept(function, compiler_options=HASTY)
 
     @wraps(function)
     def call(*args: Any, **options: Any) -> Any:

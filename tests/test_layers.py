@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FLOORS = [
-    ["jaxflex.brief"],
+    ["jaxflex.brief", "jaxflex.kept"],
     ["jaxflex.one_off"],
     ["jaxflex.scalars", "jaxflex.trigonometry", "jaxflex.session", "jaxflex.sweep", "jaxflex.timing"],
     ["jaxflex.beam", "jaxflex.motor", "jaxflex.effects"],

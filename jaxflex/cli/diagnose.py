@@ -74,8 +74,8 @@ def show(found: Diagnosis, file: ArmFile) -> None:
 def write(found: Diagnosis, file: ArmFile, recordings: Sequence[str], folder: Path) -> str:
     """Write report, arm and pictures; returns what was written."""
     pictures = draw(found)
-    for name, (figure, *_) in pictures.items():
-        figure.savefig(folder / f"{name}.png", dpi=130)
+    for name, (image, *_) in pictures.items():
+        (folder / f"{name}.png").write_bytes(image)
     write_diagnosis_report(folder / "report.html", found, file, recordings, pictures)
     write_json(folder / "report.json", found.to_json())
     save_arm(found.improved, folder / "improved.toml", file.uncertainty)

@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from ..diagnosis.result import Diagnosis
 from ..files.arm_file import ArmFile
 from ..plotting_diagnosis import SPECTRUM, VIEWS, plot_force, plot_force_spectrum, plot_gap, plot_prediction
 from . import words
 from .diagnosis_tables import calibrated_table, effect_table, far_moved, gap_table, where_table
-from .report import bullets, card, grid, paragraph, picture, section, tables, write_report
+from .report import Picture, bullets, card, grid, paragraph, picture, png, section, tables, write_report
 
 ACCENTS = {
     "nothing_missing": "#3a8f5c",
@@ -43,7 +41,7 @@ EVIDENCE = (
 )
 
 
-def draw(found: Diagnosis) -> dict[str, tuple[Figure, str, str]]:
+def draw(found: Diagnosis) -> dict[str, Picture]:
     """Every picture by file name, with its caption and a remark."""
     pictures = {"gap": (plot_gap(found.gap), "Error of every channel, in multiples of its noise", "")}
     if found.comparison is not None:
@@ -57,7 +55,7 @@ def draw(found: Diagnosis) -> dict[str, tuple[Figure, str, str]]:
             caption = f"Against {view.axis.partition(' [')[0]}"
             pictures[f"force_{key}"] = (plot_force(view, before, after), caption, view.shapes)
         pictures["force_spectrum"] = (plot_force_spectrum(before, after), "Its frequencies", SPECTRUM)
-    return pictures
+    return {name: (png(figure, SHARP), title, remark) for name, (figure, title, remark) in pictures.items()}
 
 
 def write_diagnosis_report(
@@ -65,12 +63,12 @@ def write_diagnosis_report(
     found: Diagnosis,
     file: ArmFile,
     recordings: Sequence[str],
-    pictures: dict[str, tuple[Figure, str, str]],
+    pictures: dict[str, Picture],
 ) -> None:
     """Write the page to `path`."""
 
     def shown(start: str) -> str:
-        return grid(*(picture(*p, dpi=SHARP) for name, p in pictures.items() if name.startswith(start)))
+        return grid(*(picture(*p) for name, p in pictures.items() if name.startswith(start)))
 
     named = [effect_table("What was added to the model", found.effects)] if found.effects else []
     if found.alternatives:

@@ -44,12 +44,19 @@ th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid var(
 tr.best td, tr.best .words:first-child { background: var(--best); font-weight: 600; }
 """
 
+Picture = tuple[bytes, str, str]  # as a PNG file holds it, caption, and remark
 
-def picture(figure: Figure, caption: str, remark: str = "", dpi: int = 130) -> str:
-    """A figure as HTML, the image inside; `remark` stands under it."""
+
+def png(figure: Figure, dpi: int = 130) -> bytes:
+    """The image of a figure, as a file holds it."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=dpi)
-    data = base64.b64encode(stream.getvalue()).decode()
+    return stream.getvalue()
+
+
+def picture(image: bytes, caption: str, remark: str = "") -> str:
+    """An image in PNG format as HTML; `remark` stands under it."""
+    data = base64.b64encode(image).decode()
     words = html.escape(caption)
     return (
         f"<figure><figcaption>{words}</figcaption>"

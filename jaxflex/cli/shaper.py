@@ -14,7 +14,7 @@ from ..files.read_recording import read_recording
 from ..plotting_shaper import plot_shapers
 from ..ringing import MeasuredMode, measure_modes
 from ..ringing.stretches import INPUTS, spectrum_of
-from .report import bullets, card, paragraph, picture, section, tables, write_report
+from .report import bullets, card, paragraph, picture, png, section, tables, write_report
 from .runtime import UsageError, console, make_folder, parse_payloads
 from .shaper_model import modes_of_arm
 from .tables import Table, number, write_json
@@ -204,7 +204,7 @@ def snippet(found: Found, best: Rated) -> str:
 def _report(path: Path, found: Found, rated: Sequence[Rated], best: Rated, why: str, figure) -> None:
     sections = [
         card("#2a6f97", paragraph(f"Take {best.name}."), paragraph(why[0].upper() + why[1:])),
-        picture(figure, "What rings, and what each shaper leaves of it", dpi=180),
+        picture(png(figure, dpi=180), "What rings, and what each shaper leaves of it"),
         tables([mode_table(found), shaper_table(found, rated, best)]),
         paragraph(EXPLAINED),
         section(

@@ -82,8 +82,8 @@ def tune(
     uncertainty = file.uncertainty if file else {}
     save_design(folder / "tuned.toml", middle, uncertainty, design)
     pictures = draw(comparison, tuned, chosen)
-    for name, (figure, *_) in pictures.items():
-        figure.savefig(folder / f"{name}.png", dpi=130)
+    for name, (image, *_) in pictures.items():
+        (folder / f"{name}.png").write_bytes(image)
     write_tune_report(folder / "report.html", comparison, tuned, middle, pictures)
     result = as_json(comparison, tuned, chosen, time.monotonic() - began)
     write_json(json or folder / "tune.json", result)

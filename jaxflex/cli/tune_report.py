@@ -13,7 +13,7 @@ from ..analysis.measures import spectrum
 from ..arm.arm import Arm
 from ..plotting import AFTER, plot_bending, plot_history, plot_residual, plot_spectra
 from .comparison import STRETCHED, TUNED, UNTUNED, Comparison, best_classical, comparison_tables
-from .report import bullets, card, grid, paragraph, picture, section, tables, write_report
+from .report import Picture, bullets, card, grid, paragraph, picture, png, section, tables, write_report
 from .tables import Table
 
 DESIGNS = (
@@ -81,7 +81,7 @@ def design_table(design: Design, arm: Arm) -> Table:
     return table
 
 
-def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str, tuple[Figure, str, str]]:
+def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str, Picture]:
     """The pictures, each with its caption and what to see in it."""
     names, path = list(comparison.designs), comparison.trajectory
     first, last = names.index(UNTUNED), names.index(TUNED)
@@ -103,7 +103,7 @@ def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str,
     def bending(k: int, end: float) -> Figure:
         return plot_bending(times, bends[k][on], end, payloads, top)
 
-    return {
+    figures = {
         "before": (
             bending(first, ends[0]),
             "Before: textbook controller, plain move",
@@ -135,6 +135,7 @@ def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str,
             f"The cost is the logarithm of the vibration and of what else counts. The search {tuned.minima[0].reason}.",
         ),
     }  # fmt: skip
+    return {name: (png(figure), title, remark) for name, (figure, title, remark) in figures.items()}
 
 
 def write_tune_report(
@@ -142,7 +143,7 @@ def write_tune_report(
     comparison: Comparison,
     tuned: Tuned,
     arm: Arm,
-    pictures: dict[str, tuple[Figure, str, str]],
+    pictures: dict[str, Picture],
 ) -> None:
     """Write the page to `path`."""
 

@@ -5,7 +5,7 @@ number. What departs farther than nearly all such arms has made up for something
 """
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from ..effects import EFFECTS, AbstractDryFriction
 from .hypothesis import CLOSE, Hypothesis
@@ -64,4 +64,4 @@ def _stated(parameters: Parameters) -> int:
 
 def _usual(share: float, stated: int) -> float:
     """The departure that this share of arms stays below."""
-    return float(np.sqrt(chi2.ppf(share, stated) / stated))
+    return float(np.sqrt(2 * gammaincinv(stated / 2, share) / stated))

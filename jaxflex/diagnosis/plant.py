@@ -21,6 +21,7 @@ from ..drive import drive, drive_effects, effect_torques, has_current_state, joi
 from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
 from ..effects import AbstractDryFriction, WindingHeating
+from ..kept import kept
 from ..scalars import Scalar
 from ..sensors import read_channels
 from .dry_friction import Stepping, dry_friction
@@ -191,7 +192,7 @@ def lag(time: Float[Array, " channels"], sample_time: float) -> Lag:
     return Lag(left, (1 - left) * time / sample_time)
 
 
-@eqx.filter_jit
+@kept
 def respond(
     model: AssembledArm,
     instruments: Instruments,
@@ -258,7 +259,7 @@ class Interval(NamedTuple):
     after: Float[Array, "*more moments channels"]
 
 
-@eqx.filter_jit
+@kept
 def interval_slopes(
     model: AssembledArm,
     channels: tuple[str, ...],

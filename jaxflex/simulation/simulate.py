@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference
 from ..effects import AbstractSensorEffect
+from ..kept import kept
 from ..scalars import Scalar, ScalarLike, dot, optional_scalar, scalar
 from ..sensors import channel_names, read_channels
 from .derivatives import both_modes
@@ -102,7 +103,7 @@ def simulate(
     inputs = (plant, start, times, method, wanted, max_steps, adjoint)
     if any(isinstance(leaf, Tracer) for leaf in jtu.tree_leaves(inputs)):
         return _integrate(*inputs)
-    return eqx.filter_jit(_integrate)(*inputs).check()
+    return _integrate_at_once(*inputs).check()
 
 
 def _period(controller: AbstractController, asked: Scalar | None) -> Scalar | None:
@@ -272,3 +273,6 @@ def _integrate(
         if isinstance(effect, AbstractSensorEffect) and effect.location in channels:
             channels[effect.location] = effect.read(times, channels[effect.location])
     return Trajectory(times, channels, states, status, steps, rejected)
+
+
+_integrate_at_once = kept(_integrate)

@@ -1,0 +1,241 @@
+"""Programs kept as they were traced, so that a later process that finds them need not trace them again.
+
+JAX keeps compiled programs but looks them up by the traced one, and tracing is most of a warm start.
+Like the compiled ones, they are only as trustworthy as whoever may write to the cache.
+"""
+
+import hashlib
+import importlib
+import inspect
+import io
+import os
+import pickle
+import sys
+from collections.abc import Callable
+from functools import cache, partial, wraps
+from pathlib import Path
+from types import BuiltinFunctionType, FunctionType
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+import numpy as np
+from jax.core import Tracer
+
+# whose functions and classes are what their names and versions say
+OWN = ("jaxflex", "controllers")
+OTHERS = ("jax", "numpy", "equinox", "diffrax", "optimistix", "lineax")
+PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis))
+
+
+SETTINGS = ("jax_enable_x64", "jax_default_matmul_precision", "jax_numpy_dtype_promotion")
+
+
+class Unkept(Exception):
+    """No file can stand for this program in another process."""
+
+
+class Slot:
+    """Where an array goes among the results."""
+
+
+def kept(function: Callable, **options: Any) -> Callable:
+    """`function` of pytrees under `jit`, with the cache of `set_up` keeping its traced program too.
+
+    What is not an array is constant, as in `equinox.filter_jit`, which takes the call where there
+    is no cache, where arguments are traced or lie on other devices, and where one holds a function or
+    class of one's own, which may be another tomorrow under the same name. `options` as for `jax.jit`.
+    """
+    plain = eqx.filter_jit(function, **options)
+    programs: dict[Any, Callable | None] = {}
+
+    @wraps(function)
+    def call(*args: Any, **named: Any) -> Any:
+        folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
+        arrays, constants = eqx.partition((args, named), _is_array)
+        leaves, tree = jtu.tree_flatten(arrays)
+        if folder is None or any(_is_elsewhere(leaf) for leaf in leaves):
+            return plain(*args, **named)
+        fixed, form = jtu.tree_flatten(constants)
+        key = (tree, form, tuple(fixed), tuple((leaf.shape, leaf.dtype) for leaf in leaves))
+        if key not in programs:
+
+            def flat(*leaves):
+                given, called = eqx.combine(jtu.tree_unflatten(tree, leaves), constants)
+                return function(*given, **called)
+
+            try:
+                name = named_for_good((function, *_shaped((args, named))))
+                programs[key] = _program(flat, _shaped(leaves), Path(folder) / "traced" / name, options)
+            except Unkept:
+                programs[key] = None
+        program = programs[key]
+        return plain(*args, **named) if program is None else program(leaves)
+
+    return call
+
+
+def _is_array(leaf: Any) -> bool:
+    return isinstance(leaf, (jax.Array, np.ndarray, np.generic))
+
+
+def _shaped(value: Any) -> Any:
+    """`value` with the shape and type of every array in its place."""
+    return jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype) if _is_array(x) else x, value)
+
+
+def _is_elsewhere(leaf: Any) -> bool:
+    """True of what is traced, and of arrays on several devices or on one of another kind."""
+    if isinstance(leaf, Tracer):
+        return True
+    if not isinstance(leaf, jax.Array):
+        return False
+    return [device.platform for device in leaf.devices()] != [jax.default_backend()]
+
+
+def _program(flat: Callable, shapes: list, file: Path, options: dict) -> Callable:
+    """The program in `file`, traced and written there if it is not."""
+    try:
+        form, data = _Reader(io.BytesIO(file.read_bytes())).load()
+        exported = jax.export.deserialize(data)
+    except Exception:  # not there, or of no use
+        form, exported = _traced(flat, shapes)
+        _write(file, form, exported)
+    run = jax.jit(exported.call, **options)
+    places, tree = jtu.tree_flatten(form)
+
+    def call(leaves):
+        results = iter(run(*leaves))
+        return jtu.tree_unflatten(tree, [next(results) if isinstance(p, Slot) else p for p in places])
+
+    return call
+
+
+def _traced(flat: Callable, shapes: list) -> tuple[Any, jax.export.Exported]:
+    """The form of the results, with slots for arrays, and the program that computes these."""
+    forms = []
+
+    def arrays(*leaves):
+        results = flat(*leaves)
+        forms.append(jtu.tree_map(lambda leaf: Slot() if eqx.is_array(leaf) else leaf, results))
+        return [leaf for leaf in jtu.tree_leaves(results) if eqx.is_array(leaf)]
+
+    try:
+        exported = jax.export.export(jax.jit(arrays))(*shapes)
+    except (
+        Exception
+    ) as error:  # it calls back to Python; or the function refuses its arguments, and will again
+        raise Unkept from error
+    return forms[-1], exported
+
+
+def _write(file: Path, form: Any, exported: jax.export.Exported) -> None:
+    _described(form)  # or it could not be read again
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f"{file.name}.{os.getpid()}")
+    with unfinished.open("wb") as stream:
+        _Writer(stream).dump((form, bytes(exported.serialize())))
+    unfinished.replace(file)
+
+
+class _Writer(pickle.Pickler):
+    """Writes the constants of modules by name: what is read has to be the same object."""
+
+    def persistent_id(self, obj: Any) -> str | None:
+        return _constant_name(obj)
+
+
+class _Reader(pickle.Unpickler):
+    def persistent_load(self, pid: str) -> Any:
+        module, _, name = pid.rpartition(":")
+        return getattr(importlib.import_module(module), name)
+
+
+def named_for_good(value: Any) -> str:
+    """A name for `value`, a pytree of constants, that is the same in every process of these versions.
+
+    **Raises** `Unkept` if there is none.
+    """
+    settings = [getattr(jax.config, name) for name in SETTINGS]
+    text = f"{_versions()} {settings} {os.environ.get('EQX_ON_ERROR')} {_described(value)}"
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def _versions() -> str:
+    """Versions of what programs are traced by, and the source of the library's own packages."""
+    versions = [getattr(sys.modules.get(name), "__version__", "") for name in OTHERS]
+    digest = hashlib.sha256(" ".join([sys.version, jax.default_backend(), *versions]).encode())
+    for name in OWN:
+        if name in sys.modules:
+            for path in sorted(Path(inspect.getfile(sys.modules[name])).parent.rglob("*.py")):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _described(value: Any) -> str:
+    """What `value` is, piece by piece, a line each."""
+    parts: list[str] = []
+    _describe(value, parts)
+    return "\n".join(parts)
+
+
+def _describe(value: Any, parts: list[str]) -> None:
+    kind = type(value)
+    if kind in PLAIN or (kind is type and value in PLAIN):
+        parts.append(repr(value))
+    elif isinstance(value, (type, FunctionType, BuiltinFunctionType)):
+        parts.append(_public_name(value))
+    elif isinstance(value, partial):
+        _describe(("partial", value.func, value.args, value.keywords), parts)
+    elif isinstance(value, np.dtype):
+        parts.append(value.str)
+    elif isinstance(value, jax.ShapeDtypeStruct):
+        parts.append(f"{value.shape} {value.dtype}")
+    elif isinstance(value, (tuple, list)):
+        parts.append(f"{_public_name(kind)} {len(value)}")
+        for item in value:
+            _describe(item, parts)
+    elif isinstance(value, frozenset):
+        parts.append(f"frozenset {sorted(_described(item) for item in value)}")
+    elif isinstance(value, jtu.PyTreeDef):
+        _describe((value.node_data(), value.children()), parts)
+    elif isinstance(value, dict):
+        parts.append(f"dict {len(value)}")
+        for item in value.items():
+            _describe(item, parts)
+    elif isinstance(value, eqx.Module):
+        parts.append(_public_name(kind))
+        _describe(dict(vars(value)), parts)
+    elif isinstance(value, Slot):
+        parts.append("array")
+    else:
+        name = _constant_name(value)
+        if name is None:
+            raise Unkept(f"{value!r} has no name of its own")
+        parts.append(name)
+
+
+def _constant_name(value: Any) -> str | None:
+    """`module:name` of an object that a module of a known version holds, as of its own class; else None."""
+    module = type(value).__module__
+    if module.partition(".")[0] not in (*OWN, *OTHERS):
+        return None
+    names = [name for name, found in vars(sys.modules[module]).items() if found is value]
+    return f"{module}:{names[0]}" if names else None
+
+
+def _public_name(value: Any) -> str:
+    """Module and name of a class or function of a known version."""
+    module, name = value.__module__ or "", value.__qualname__
+    if module.partition(".")[0] not in (*OWN, *OTHERS, "builtins", "jaxlib"):
+        raise Unkept(f"{module}.{name} may change without notice")
+    found = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    while found is not value:  # it may be known by what decorates it
+        found = getattr(found, "__wrapped__", None)
+        if found is None:
+            raise Unkept(f"{module}.{name} is not what has that name")
+    return f"{module}.{name}"
