@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable
 from functools import cache, partial, wraps
 from pathlib import Path
+from threading import RLock
 from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
@@ -44,11 +45,13 @@ def kept(function: Callable, **options: Any) -> Callable:
     """`function` of pytrees under `jit`, with the cache of `set_up` keeping its traced program too.
 
     What is not an array is constant, as in `equinox.filter_jit`, which takes the call where there
-    is no cache, where arguments are traced or lie on other devices, and where one holds a function or
-    class of one's own, which may be another tomorrow under the same name. `options` as for `jax.jit`.
+    is no cache, where arguments are traced or lie on other devices, and where the function, or a
+    function or class among the constants, is of none of the packages `OWN` and `OTHERS`: it may be
+    another tomorrow under the same name. `options` as for `jax.jit`.
     """
     plain = eqx.filter_jit(function, **options)
     programs: dict[Any, Callable | None] = {}
+    tracing = RLock()  # threads that want the same program wait for the first of them
 
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:
@@ -59,17 +62,18 @@ def kept(function: Callable, **options: Any) -> Callable:
             return plain(*args, **named)
         fixed, form = jtu.tree_flatten(constants)
         key = (tree, form, tuple(fixed), tuple((leaf.shape, leaf.dtype) for leaf in leaves))
-        if key not in programs:
 
-            def flat(*leaves):
-                given, called = eqx.combine(jtu.tree_unflatten(tree, leaves), constants)
-                return function(*given, **called)
+        def flat(*leaves):
+            given, called = eqx.combine(jtu.tree_unflatten(tree, leaves), constants)
+            return function(*given, **called)
 
-            try:
-                name = named_for_good((function, *_shaped((args, named))))
-                programs[key] = _program(flat, _shaped(leaves), Path(folder) / "traced" / name, options)
-            except Unkept:
-                programs[key] = None
+        with tracing:
+            if key not in programs:
+                try:
+                    name = named_for_good((function, *_shaped((args, named))))
+                    programs[key] = _program(flat, _shaped(leaves), Path(folder) / "traced" / name, options)
+                except Unkept:
+                    programs[key] = None
         program = programs[key]
         return plain(*args, **named) if program is None else program(leaves)
 

@@ -17,6 +17,7 @@ from jaxflex.kept import Unkept, named_for_good
 ROOT = Path(__file__).resolve().parents[1]
 LINK = """
 import sys
+from concurrent.futures import ThreadPoolExecutor
 import jax, jax.numpy as jnp
 import jaxflex as jf, controllers as ctl
 jf.set_up(cache=sys.argv[1])
@@ -28,21 +29,24 @@ def tip(mass):
     run = jf.simulate(arm.with_payload(mass), {law}, ctl.Move((0.0,), (0.5,), 0.5), jnp.linspace(0.0, 1.0, 11),
                       method=jf.Fixed(1e-3), channels=["tip_x"])
     return run["tip_x"][-1]
-print(len(traced), repr(float(tip(0.05))), len(traced), {more})
+with ThreadPoolExecutor(2) as pool:
+    first, second = (float(end) for end in pool.map(tip, (0.05, 0.05)))
+assert first == second
+print(len(traced), first, {more})
 """
 PD = "ctl.PD((2.0,), (0.5,))"
 
 
 def run(cache: Path, law: str = PD, own: str = "", more: str = "0"):
-    """Counts of traced energies before and after a simulation, where it ended, and `more`."""
+    """How often the energy was traced for a simulation in two threads, where it ended, and `more`."""
     code = LINK.replace("{law}", law).replace("{more}", more).replace("arm = jf", f"{own}\narm = jf")
     found = subprocess.run(
         [sys.executable, "-c", code, str(cache)],
         capture_output=True, text=True, check=True,
         env={"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT), "HOME": str(cache)},
     )  # fmt: skip
-    before, end, after, rest = found.stdout.split()
-    return int(after) - int(before), float(end), float(rest)
+    traced, end, rest = map(float, found.stdout.split())
+    return traced, end, rest
 
 
 def test_a_second_process_traces_nothing_and_gets_the_same(tmp_path):
