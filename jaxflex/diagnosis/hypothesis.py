@@ -37,6 +37,7 @@ FORM_IS_KNOWN = {
 }  # fmt: skip
 BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal parameters could be bent to imitate
+FARTHEST_REST = 2 * np.pi  # rad, of a cable
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 FREQUENCIES = 3  # of a periodic disturbance that are tried
@@ -310,6 +311,10 @@ class Search:
     def sensible(self, found: Hypothesis) -> bool:
         """False if the effect added last came to a size that makes no sense."""
         last = found.effects[-1]
+        if last.effect == "cable_stiffness":
+            rest = found.fit.vector[self.parameters.position(*last.key, "rest_angle")]
+            if abs(rest) > FARTHEST_REST:
+                return False  # from so far it pulls as a constant torque does
         size = (found.fit.vector[self.parameters.position(*last.key, name)] for name in last.amplitudes)
         return not last.amplitudes or plausible(last, tuple(size))
 
