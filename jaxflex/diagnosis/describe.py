@@ -28,7 +28,9 @@ from .study import Study
 
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
-OWN_ERROR = 0.02  # of an effect's size: what the form given to it may be wrong by
+OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
+OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
+DELAY_ERROR = 0.05  # of a sample: a delayed command counts as its mean over each
 
 
 class Nominally(NamedTuple):
@@ -141,7 +143,9 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
             estimates[column] = Estimate(size, size * part.spread * float(std), parameter_unit(part.name))
         else:
             part = parameters.effect[column - len(parameters.nominal)]
-            whole = float(np.hypot(std, OWN_ERROR * value))
+            own = OWN_ERRORS.get(part.effect, OWN_ERROR) * value
+            late = DELAY_ERROR * search.problem.setting.sample_time if part.effect == "input_delay" else 0.0
+            whole = float(np.sqrt(std**2 + own**2 + late**2))
             estimates[column] = Estimate(float(value), whole, _unit(part.unit, part.location))
     return estimates
 
