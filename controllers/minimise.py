@@ -37,13 +37,42 @@ class Stepper(eqx.Module):
     """What is minimised and how.
 
     `objective(free, args)` returns a cost and, as a pytree of arrays, whatever else is
-    worth knowing of a point. `minimiser` is one of optimistix: `BFGS`, `NelderMead`, or
+    worth knowing of a point. `minimiser` is one of optimistix that judge a point a step: `BFGS`, `LBFGS`, or
     any of optax as `optx.OptaxMinimiser(optax.adam(0.05), rtol, atol)`. Programs are
     compiled once for an objective and a minimiser, whatever the `args`.
     """
 
     objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]
     minimiser: optx.AbstractMinimiser
+
+
+def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
+    """`objective`, its derivative computed together with it, in the mode that suits their number.
+
+    What the objective returns beside its cost has no derivative.
+    """
+
+    def call(free, args):
+        @jax.custom_jvp
+        def of(free):
+            return objective(free, args)
+
+        @of.defjvp
+        def _(primals, tangents):
+            (value, aux), gradient = value_and_gradient(lambda x: objective(x, args), has_aux=True)(
+                primals[0]
+            )
+            return (value, aux), (jnp.dot(gradient, tangents[0]), jax.tree_util.tree_map(_constant, aux))
+
+        return of(free)
+
+    return call
+
+
+def _constant(leaf):
+    """The tangent of what does not move."""
+    exact = not jnp.issubdtype(leaf.dtype, jnp.inexact)
+    return np.zeros(leaf.shape, jax.dtypes.float0) if exact else jnp.zeros_like(leaf)
 
 
 def known(cost: Scalar, gradient: Free, aux: PyTree):
@@ -55,14 +84,13 @@ def known(cost: Scalar, gradient: Free, aux: PyTree):
 
     @jax.custom_jvp
     def of(free):
-        return cost, aux
+        return cost
 
     @of.defjvp
     def _(primals, tangents):
-        nothing = jax.tree_util.tree_map(jnp.zeros_like, aux)
-        return (cost, aux), (jnp.dot(gradient, tangents[0]), nothing)
+        return cost, jnp.dot(gradient, tangents[0])
 
-    return lambda free, args: of(free)
+    return lambda free, args: (of(free), aux)
 
 
 def _start(stepper: Stepper, free: Free, args: PyTree):
@@ -73,9 +101,12 @@ def _start(stepper: Stepper, free: Free, args: PyTree):
 def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
     """One step: the point it judged, with its cost and aux, and where it goes on from."""
     minimiser = stepper.minimiser
-    judged = getattr(state, "y_eval", free)  # quasi-Newton: a step ahead of the last point accepted
-    (cost, aux), gradient = value_and_gradient(lambda x: stepper.objective(x, args), has_aux=True)(judged)
-    fn = known(cost, gradient, aux)
+    if hasattr(state, "y_eval"):  # quasi-Newton: it judges this point and no other
+        both = value_and_gradient(lambda x: stepper.objective(x, args), has_aux=True)
+        (cost, aux), gradient = both(state.y_eval)
+        fn = known(cost, gradient, aux)
+    else:  # optax: a line search may go further
+        fn = with_gradient(stepper.objective)
     after, new, last_aux = minimiser.step(fn, free, args, OPTIONS, state, frozenset())
     done, result = minimiser.terminate(fn, after, args, OPTIONS, new, frozenset())
     if hasattr(new, "f_info"):  # quasi-Newton: it returns the last point accepted

@@ -6,15 +6,17 @@ Like the compiled ones, they are only as trustworthy as whoever may write to the
 
 import hashlib
 import importlib
-import inspect
+import importlib.util
 import io
 import os
 import pickle
 import sys
+import time
+import warnings
 from collections.abc import Callable
-from functools import cache, partial, wraps
+from functools import partial, wraps
 from pathlib import Path
-from threading import RLock
+from threading import RLock, get_ident
 from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
@@ -31,6 +33,8 @@ PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis))
 
 
 SETTINGS = ("jax_enable_x64", "jax_default_matmul_precision", "jax_numpy_dtype_promotion")
+DEBUGGING = ("jax_disable_jit", "jax_debug_nans", "jax_debug_infs")
+STARTED = time.time()
 
 
 class Unkept(Exception):
@@ -58,22 +62,26 @@ def kept(function: Callable, **options: Any) -> Callable:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
         arrays, constants = eqx.partition((args, named), _is_array)
         leaves, tree = jtu.tree_flatten(arrays)
-        if folder is None or any(_is_elsewhere(leaf) for leaf in leaves):
+        debugging = any(getattr(jax.config, name) for name in DEBUGGING)
+        if folder is None or debugging or any(_is_elsewhere(leaf) for leaf in leaves):
             return plain(*args, **named)
         fixed, form = jtu.tree_flatten(constants)
-        key = (tree, form, tuple(fixed), tuple((leaf.shape, leaf.dtype) for leaf in leaves))
+        kinds = tuple((leaf.shape, leaf.dtype, _is_weak(leaf)) for leaf in leaves)
+        key = (tree, form, tuple(fixed), kinds, folder, _settings())
 
         def flat(*leaves):
             given, called = eqx.combine(jtu.tree_unflatten(tree, leaves), constants)
             return function(*given, **called)
 
-        with tracing:
-            if key not in programs:
-                try:
-                    name = named_for_good((function, *_shaped((args, named))))
-                    programs[key] = _program(flat, _shaped(leaves), Path(folder) / "traced" / name, options)
-                except Unkept:
-                    programs[key] = None
+        if key not in programs:
+            with tracing:
+                if key not in programs:
+                    try:
+                        name = named_for_good((function, *_shaped((args, named))))
+                        file = Path(folder) / "traced" / name
+                        programs[key] = _program(flat, _shaped(leaves), file, options)
+                    except Unkept:
+                        programs[key] = None
         program = programs[key]
         return plain(*args, **named) if program is None else program(leaves)
 
@@ -84,9 +92,21 @@ def _is_array(leaf: Any) -> bool:
     return isinstance(leaf, (jax.Array, np.ndarray, np.generic))
 
 
+def _is_weak(leaf: Any) -> bool:
+    return getattr(leaf, "weak_type", False)
+
+
+def _settings() -> tuple:
+    return (*(getattr(jax.config, name) for name in SETTINGS), os.environ.get("EQX_ON_ERROR"))
+
+
 def _shaped(value: Any) -> Any:
     """`value` with the shape and type of every array in its place."""
-    return jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype) if _is_array(x) else x, value)
+
+    def shape(x):
+        return jax.ShapeDtypeStruct(x.shape, x.dtype, weak_type=_is_weak(x)) if _is_array(x) else x
+
+    return jtu.tree_map(shape, value)
 
 
 def _is_elsewhere(leaf: Any) -> bool:
@@ -104,8 +124,9 @@ def _program(flat: Callable, shapes: list, file: Path, options: dict) -> Callabl
         form, data = _Reader(io.BytesIO(file.read_bytes())).load()
         exported = jax.export.deserialize(data)
     except Exception:  # not there, or of no use
-        form, exported = _traced(flat, shapes)
-        _write(file, form, exported)
+        form, data = _traced(flat, shapes)
+        exported = jax.export.deserialize(data)  # as the next process will find it
+        _write(file, form, data)
     run = jax.jit(exported.call, **options)
     places, tree = jtu.tree_flatten(form)
 
@@ -116,8 +137,8 @@ def _program(flat: Callable, shapes: list, file: Path, options: dict) -> Callabl
     return call
 
 
-def _traced(flat: Callable, shapes: list) -> tuple[Any, jax.export.Exported]:
-    """The form of the results, with slots for arrays, and the program that computes these."""
+def _traced(flat: Callable, shapes: list) -> tuple[Any, bytearray]:
+    """The form of the results, with slots for arrays, and the program that computes these, as a file holds it."""
     forms = []
 
     def arrays(*leaves):
@@ -126,21 +147,24 @@ def _traced(flat: Callable, shapes: list) -> tuple[Any, jax.export.Exported]:
         return [leaf for leaf in jtu.tree_leaves(results) if eqx.is_array(leaf)]
 
     try:
-        exported = jax.export.export(jax.jit(arrays))(*shapes)
+        data = jax.export.export(jax.jit(arrays))(*shapes).serialize()
     except (
         Exception
     ) as error:  # it calls back to Python; or the function refuses its arguments, and will again
         raise Unkept from error
-    return forms[-1], exported
+    return forms[-1], data
 
 
-def _write(file: Path, form: Any, exported: jax.export.Exported) -> None:
+def _write(file: Path, form: Any, data: bytearray) -> None:
     _described(form)  # or it could not be read again
-    file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_name(f"{file.name}.{os.getpid()}")
-    with unfinished.open("wb") as stream:
-        _Writer(stream).dump((form, bytes(exported.serialize())))
-    unfinished.replace(file)
+    unfinished = file.with_name(f"{file.name}.{os.getpid()}.{get_ident()}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with unfinished.open("wb") as stream:
+            _Writer(stream).dump((form, bytes(data)))
+        unfinished.replace(file)
+    except OSError as error:
+        warnings.warn(f"no traced program is kept: {error}", stacklevel=2)
 
 
 class _Writer(pickle.Pickler):
@@ -161,19 +185,20 @@ def named_for_good(value: Any) -> str:
 
     **Raises** `Unkept` if there is none.
     """
-    settings = [getattr(jax.config, name) for name in SETTINGS]
-    text = f"{_versions()} {settings} {os.environ.get('EQX_ON_ERROR')} {_described(value)}"
+    text = f"{_versions()} {_settings()} {_described(value)}"
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-@cache
 def _versions() -> str:
     """Versions of what programs are traced by, and the source of the library's own packages."""
     versions = [getattr(sys.modules.get(name), "__version__", "") for name in OTHERS]
     digest = hashlib.sha256(" ".join([sys.version, jax.default_backend(), *versions]).encode())
     for name in OWN:
-        if name in sys.modules:
-            for path in sorted(Path(inspect.getfile(sys.modules[name])).parent.rglob("*.py")):
+        found = importlib.util.find_spec(name)
+        for folder in (found.submodule_search_locations or []) if found else []:
+            for path in sorted(Path(folder).rglob("*.py")):
+                if path.stat().st_mtime > STARTED:
+                    raise Unkept(f"{path} is newer than what this process imported")
                 digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -196,7 +221,7 @@ def _describe(value: Any, parts: list[str]) -> None:
     elif isinstance(value, np.dtype):
         parts.append(value.str)
     elif isinstance(value, jax.ShapeDtypeStruct):
-        parts.append(f"{value.shape} {value.dtype}")
+        parts.append(f"{value.shape} {value.dtype} {value.weak_type}")
     elif isinstance(value, (tuple, list)):
         parts.append(f"{_public_name(kind)} {len(value)}")
         for item in value:

@@ -89,3 +89,9 @@ def test_what_has_no_lasting_name_is_not_kept():
     for thing in (lambda x: x, Own(), Own, object(), test_names_tell_constants_apart):
         with pytest.raises(Unkept):
             named_for_good((thing,))
+
+
+def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(tmp_path):
+    (tmp_path / "traced").write_text("a file where the folder should be")
+    traced, end, _ = run(tmp_path)
+    assert traced > 0 and np.isfinite(end)

@@ -34,6 +34,8 @@ def departure(parameters: Parameters, hypothesis: Hypothesis) -> float:
     many may have made up for what is missing.
     """
     moved = np.abs(list(departures(parameters, hypothesis).values()))
+    if not moved.size:
+        return 0.0
     farthest = moved.max(initial=0.0) if hypothesis.fit.level < CLOSE else 0.0
     return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 

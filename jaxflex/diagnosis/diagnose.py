@@ -60,6 +60,7 @@ def diagnose(
             loose.outcome = find(loose.search, start)
             if _solves(loose, chosen):
                 loose.outcome.nominal_level = chosen.outcome.nominal_level  # of the arm as it was stated
+                loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
                 chosen = loose
     weigh(chosen.search, chosen.outcome)
     return describe(chosen, stated, began)

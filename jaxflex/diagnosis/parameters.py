@@ -124,13 +124,6 @@ class Parameters:
             lambda a: [path(a) for path in paths], self.arm, [value for _, value in moved.values()]
         )
 
-    def nominal_values(self, vector: np.ndarray) -> dict[str, float]:
-        """Values of the nominal parameters in SI units."""
-        return {
-            part.name: part.value * float(np.exp(part.spread * vector[i]))
-            for i, part in enumerate(self.nominal)
-        }
-
 
 def _field(index: int, field: str) -> Callable[[Any], Any]:
     return lambda arm: getattr(arm.effects[index], field)

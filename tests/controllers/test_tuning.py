@@ -291,3 +291,22 @@ def test_slower_moves_leave_less_vibration(problem):
         for t, x in zip(front.move_time, front.tuned, strict=True)
     ]
     np.testing.assert_allclose([d.move_time() for d in designs], front.move_time, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "minimiser",
+    [
+        optx.BFGS(rtol=1e-8, atol=1e-8),
+        optx.NonlinearCG(rtol=1e-8, atol=1e-8),
+        optx.OptaxMinimiser(optax.lbfgs(), rtol=1e-8, atol=1e-8),
+    ],
+    ids=["one point a step", "conjugate gradients", "a line search"],
+)
+def test_minimisers_are_told_the_cost_of_the_point_they_ask_for(minimiser):
+    def valley(x, args):
+        cost = (1 - x[0]) ** 2 + 10 * (x[1] - x[0] ** 2) ** 2
+        return cost, {"count": jnp.sum(x < 100.0), "cost": cost}
+
+    (found,) = minimise(Stepper(valley, minimiser), jnp.asarray([[-0.5, 0.6]]), 400)
+    assert found.cost < 1e-5
+    assert found.aux["count"] == 2 and found.aux["cost"] == pytest.approx(found.cost)
