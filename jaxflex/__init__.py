@@ -83,10 +83,14 @@ from .files.read_recording import read_recording as read_recording
 from .files.recording import Recording as Recording
 from .files.recording import RecordingError as RecordingError
 
-# Programs that run once
+# Programs kept between processes
 from .kept import kept as kept
+
+# Motors
 from .motor import DCMotor as DCMotor
 from .motor import MotorAxis as MotorAxis
+
+# Programs that run once
 from .one_off import one_off as one_off
 
 # Scalars and sensors

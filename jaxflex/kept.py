@@ -30,11 +30,9 @@ from jax.core import Tracer
 OWN = ("jaxflex", "controllers")
 OTHERS = ("jax", "numpy", "equinox", "diffrax", "optimistix", "lineax")
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis))
-
-
 SETTINGS = ("jax_enable_x64", "jax_default_matmul_precision", "jax_numpy_dtype_promotion")
 DEBUGGING = ("jax_disable_jit", "jax_debug_nans", "jax_debug_infs")
-STARTED = time.time()
+STARTED = time.time()  # sources changed since are not those that this process runs
 
 
 class Unkept(Exception):
@@ -148,9 +146,8 @@ def _traced(flat: Callable, shapes: list) -> tuple[Any, bytearray]:
 
     try:
         data = jax.export.export(jax.jit(arrays))(*shapes).serialize()
-    except (
-        Exception
-    ) as error:  # it calls back to Python; or the function refuses its arguments, and will again
+    except Exception as error:
+        # it calls back to Python; or the function refuses its arguments, and will again
         raise Unkept from error
     return forms[-1], data
 
@@ -164,7 +161,11 @@ def _write(file: Path, form: Any, data: bytearray) -> None:
             _Writer(stream).dump((form, bytes(data)))
         unfinished.replace(file)
     except OSError as error:
-        warnings.warn(f"no traced program is kept: {error}", stacklevel=2)
+        warnings.warn(
+            f"a traced program could not be kept, and will be traced again by the next process: {error}; "
+            "make the folder writable, or name another in JAXFLEX_CACHE.",
+            stacklevel=2,
+        )
 
 
 class _Writer(pickle.Pickler):

@@ -11,6 +11,7 @@ from ..files.read_recording import read_recording
 from . import words
 from .diagnosis_report import draw, write_diagnosis_report
 from .diagnosis_tables import calibrated_table, effect_table, far_moved, gap_table, where_table
+from .report import save_pictures
 from .runtime import console, make_folder
 from .tables import write_json
 
@@ -74,8 +75,7 @@ def show(found: Diagnosis, file: ArmFile) -> None:
 def write(found: Diagnosis, file: ArmFile, recordings: Sequence[str], folder: Path) -> str:
     """Write report, arm and pictures; returns what was written."""
     pictures = draw(found)
-    for name, (image, *_) in pictures.items():
-        (folder / f"{name}.png").write_bytes(image)
+    save_pictures(folder, pictures)
     write_diagnosis_report(folder / "report.html", found, file, recordings, pictures)
     write_json(folder / "report.json", found.to_json())
     save_arm(found.improved, folder / "improved.toml", file.uncertainty)

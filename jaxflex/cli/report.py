@@ -54,6 +54,12 @@ def png(figure: Figure, dpi: int = 130) -> bytes:
     return stream.getvalue()
 
 
+def save_pictures(folder: Path, pictures: dict[str, Picture]) -> None:
+    """Write every picture to a file of its name."""
+    for name, (image, *_) in pictures.items():
+        (folder / f"{name}.png").write_bytes(image)
+
+
 def picture(image: bytes, caption: str, remark: str = "") -> str:
     """An image in PNG format as HTML; `remark` stands under it."""
     data = base64.b64encode(image).decode()

@@ -28,6 +28,7 @@ from ..arm.library import ahmad_arm
 from ..files.arm_file import read_arm_file
 from .comparison import STRETCHED, TUNED, UNTUNED, Comparison, best_classical, compare, comparison_tables
 from .design_file import save_design
+from .report import save_pictures
 from .runtime import UsageError, console, make_folder, parse_numbers, parse_payloads
 from .tables import write_json
 from .tune_report import conclusion, draw, write_tune_report
@@ -82,8 +83,7 @@ def tune(
     uncertainty = file.uncertainty if file else {}
     save_design(folder / "tuned.toml", middle, uncertainty, design)
     pictures = draw(comparison, tuned, chosen)
-    for name, (image, *_) in pictures.items():
-        (folder / f"{name}.png").write_bytes(image)
+    save_pictures(folder, pictures)
     write_tune_report(folder / "report.html", comparison, tuned, middle, pictures)
     result = as_json(comparison, tuned, chosen, time.monotonic() - began)
     write_json(json or folder / "tune.json", result)
