@@ -22,6 +22,11 @@ def optional_scalar(value: ScalarLike | None) -> Scalar | None:
     return None if value is None else scalar(value)
 
 
+def or_zero(value: ScalarLike | None) -> Scalar:
+    """`scalar(value)`, zero where the value is absent."""
+    return scalar(0.0 if value is None else value)
+
+
 def dot(a: tuple, b: tuple) -> Scalar | float:
     """Sum of products of two tuples of scalars, in the form XLA fuses (no arrays)."""
     terms = [x * y for x, y in zip(a, b, strict=True)]

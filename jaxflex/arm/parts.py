@@ -11,7 +11,7 @@ from ..beam.basis import MODE_SHAPES, Basis, Distal, make_basis
 from ..beam.link_model import LinkModel, assumed_modes_link, lumped_link, rigid_link
 from ..brief import brief
 from ..motor import DCMotor
-from ..scalars import Scalar, ScalarLike, optional_scalar, scalar
+from ..scalars import Scalar, ScalarLike, optional_scalar, or_zero, scalar
 
 
 def damping_ratios(value: "ScalarLike | str | tuple[ScalarLike, ...]") -> tuple[Scalar, ...] | str:
@@ -71,7 +71,7 @@ class Link(AbstractLink):
     - `thickness` [m] in the plane of bending, needed for strain alone
     - `gauge_position` [m] of the strain gauge from the root
     - `root_stiffness` [N m/rad] of the `hinged_hub` shapes
-    - `root_compliance` [rad/(N m)] of the clamp that holds the link to its hub
+    - `root_compliance` [rad/(N m)] of the clamp that holds the link to its hub (None: rigid)
     - `shortening`: share of the shortening by bending that is counted, 1 for all of it
       (centrifugal stiffening); None to leave it out
     - `deflection_from`: what measures the tip's deflection: `"tip"`, or `"gauge"`, a strain gauge
@@ -91,7 +91,7 @@ class Link(AbstractLink):
     thickness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     gauge_position: Scalar = eqx.field(converter=scalar, default=0.0)
     root_stiffness: Scalar = eqx.field(converter=scalar, default=0.0)
-    root_compliance: Scalar = eqx.field(converter=scalar, default=0.0)
+    root_compliance: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     shortening: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     motion: str = eqx.field(static=True, default="finite")
     deflection_from: str = eqx.field(static=True, default="tip")
@@ -147,11 +147,11 @@ class Link(AbstractLink):
         """Mass of the link [kg]."""
         return self.mass_per_length * self.length
 
-    def basis(self, distal: Distal, carries_link: bool, joint_compliance: ScalarLike = 0.0) -> Basis:
+    def basis(self, distal: Distal, carries_link: bool, joint_compliance: ScalarLike | None = None) -> Basis:
         """The deflection shapes of an assumed-modes link with `distal` at its ends."""
         return make_basis(
             self.mode_shapes, self.modes, self.length, self.mass_per_length,
-            self.flexural_rigidity, distal, carries_link, self.root_compliance + scalar(joint_compliance),
+            self.flexural_rigidity, distal, carries_link, or_zero(self.root_compliance) + or_zero(joint_compliance),
         )  # fmt: skip
 
     def discretise(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
@@ -162,6 +162,11 @@ class Link(AbstractLink):
         # under a force F at the tip the gauge bends by F (l - x) / EI, and the tip by F l^3 / 3 EI
         lever = self.length**3 / (3 * (self.length - self.gauge_position))
         return dataclasses.replace(model, shown=tuple(lever * bend for bend in model.gauge_curvature))
+
+    def _shortening(self, joint: "Joint") -> Scalar | None:
+        """The share of bending in it; None if neither bending nor a turn of the root takes off any length."""
+        turns = any(part is not None for part in (joint.play, joint.compliance, self.root_compliance))
+        return scalar(0.0) if self.shortening is None and turns and not self.moves_little else self.shortening
 
     def _constants(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         if self.modes == 0:
@@ -174,12 +179,12 @@ class Link(AbstractLink):
             return lumped_link(
                 self.length, self.mass_per_length, self.flexural_rigidity,
                 self.damping_ratio, self.gauge_position, self.segments, None, distal.mass,
-                self.root_compliance, joint.compliance,
+                or_zero(self.root_compliance), or_zero(joint.compliance),
             )  # fmt: skip
         return assumed_modes_link(
             self.basis(distal, carries_link, joint.compliance), self.mass_per_length,
             self.flexural_rigidity, self.damping_ratio, self.gauge_position,
-            joint.compliance, self.shortening, joint.play is not None,
+            or_zero(joint.compliance), self._shortening(joint), joint.play is not None,
         )  # fmt: skip
 
 
@@ -194,8 +199,8 @@ class Joint(eqx.Module):
     - `rotor_inertia` I_r [kg m^2], turning at the gear ratio times the joint's rate
       (Ahmad et al. (7))
     - `motor`: a `DCMotor`, or None for a joint driven by a torque
-    - `compliance` [rad/(N m)] of the spring between motor and link, which follows at once;
-      the hub inertia stays on the motor's side, and so do the joint's angle and rate
+    - `compliance` [rad/(N m)] of the spring between motor and link, which follows at once
+      (None: rigid); the hub inertia stays on the motor's side, and so do the joint's angle and rate
     - `play` [rad] between motor and link (None: they are one), `contact_stiffness`
       [N m/rad] and `contact_damping` [N m s/rad] of its flanks; without a gap these are a
       spring and a damper. Of the hub inertia `motor_share` stays on the motor's side
@@ -206,7 +211,7 @@ class Joint(eqx.Module):
     viscous_friction: Scalar = eqx.field(converter=scalar, default=0.0)
     rotor_inertia: Scalar = eqx.field(converter=scalar, default=0.0)
     motor: DCMotor | None = None
-    compliance: Scalar = eqx.field(converter=scalar, default=0.0)
+    compliance: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     play: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     contact_stiffness: Scalar | None = eqx.field(converter=optional_scalar, default=None)
     contact_damping: Scalar = eqx.field(converter=scalar, default=0.0)

@@ -32,7 +32,7 @@ class LinkModel(eqx.Module):
       `gauge_curvature` `psi_k''` at the strain gauge [1/m^2]
     - `joint_twist`: rotation [rad] of the link's root against the motor, for which the
       joint's spring or play gives way; `loose`: the last shape is the play
-    - `shortening`: what bending takes off the length, None where it is left out
+    - `shortening`: what bending takes off the length and, where that counts, a turn of the root; or None
     - `shown`: what the instrument of the tip's deflection shows of every shape, if that is not
       the deflection itself
     """
@@ -97,7 +97,7 @@ def rigid_link(length: Scalar, mass: Scalar, loose: bool = False) -> LinkModel:
     zero, one = (jnp.zeros_like(length),), (jnp.ones_like(length),)
     return LinkModel(
         length, mass, first, second, (first,), (second,), ((second,),), zero, zero, (length,), one, zero, one,
-        loose=True,
+        shortening=Shortening(((length,),), ((first,),), ((second,),)), loose=True,
     )  # fmt: skip
 
 
@@ -130,8 +130,9 @@ def assumed_modes_link(
     """The link whose deflection is a sum over `basis` (Ahmad et al. (19), Foldager et al. (8)).
 
     `joint_compliance` [rad/(N m)] is the joint's part of the basis' root compliance;
-    `shortening` the share of it that is counted; a `loose` link has one more shape, the
-    rotation of its root in the play of the joint.
+    `shortening` the share of what bending takes off the length that is counted, beside what a turn of
+    the root takes off (None: neither is); a `loose` link has one
+    more shape, the rotation of its root in the play of the joint.
     """
     length = basis.modes.length
     points, weights = quadrature(length)
@@ -177,6 +178,11 @@ def assumed_modes_link(
 
 
 def _shortening(basis: Basis, mass_per_length: Scalar, share: Scalar, loose: bool) -> Shortening:
+    """What the turn of the root takes off in full, and `share` of what bending does beyond it.
+
+    A link that turns at its root keeps its length: left out, that would soften the root by the
+    link's inertia times the square of the rate at which the joint turns.
+    """
     length = basis.modes.length
     points, weights = quadrature(length)
 
@@ -184,17 +190,20 @@ def _shortening(basis: Basis, mass_per_length: Scalar, share: Scalar, loose: boo
         slope = basis.slope(x)
         return jnp.column_stack([slope, jnp.ones_like(x)]) if loose else slope
 
+    root = slopes(jnp.zeros(1))
+
     def upto(x):
         inner, inner_weights = points * x / length, weights * x / length
         slope = slopes(inner)
-        return (slope.T * inner_weights) @ slope
+        bend = slope - root
+        return (slope.T * inner_weights) @ slope - (1 - share) * (bend.T * inner_weights) @ bend
 
     at = jax.vmap(upto)(points)
     rho = mass_per_length * weights
     return Shortening(
-        tip=_rows(share * upto(length)),
-        mean=_rows(share * jnp.einsum("p,pij->ij", rho, at)),
-        moment=_rows(share * jnp.einsum("p,pij->ij", rho * points, at)),
+        tip=_rows(upto(length)),
+        mean=_rows(jnp.einsum("p,pij->ij", rho, at)),
+        moment=_rows(jnp.einsum("p,pij->ij", rho * points, at)),
     )
 
 

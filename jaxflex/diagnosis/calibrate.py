@@ -15,6 +15,7 @@ MOST = 15  # iterations, however well they do
 FAITHFUL = 0.1  # of a fall of the cost: slopes that foretell it better than that need no renewal
 SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
 WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
+RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
 
@@ -83,7 +84,7 @@ def fit(
     Slopes of an earlier fit serve as long as they foretell how far the cost falls; with
     `fresh`, they are taken anew at the end. Ends when slopes that hold have nothing more to
     gain, when an iteration gains less than `tolerance` a reading, or, after `iterations` of
-    them, less than the share SLOW of the cost.
+    them, less than the share SLOW of the cost. Pieces that run away in a step stay where they were.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -112,7 +113,7 @@ def fit(
         kept = keep(first.cost + prior(vector), first)
         before, promise, settled = kept[0], np.inf, False
         while np.isfinite(before) and damping < STEEPEST:
-            current, cost = first, before
+            current, cost, shown = first, before, linears
             for chord in range(CHORDS):
                 _, pull, precision = freedom.prior(vector)
                 matrix, pull = current.matrix + np.diag(precision), current.vector + pull
@@ -124,12 +125,18 @@ def fit(
                 if chord == 0:
                     promise = current.promise + float(pull @ step)
                 step = np.maximum(vector[columns] + step, freedom.lowest) - vector[columns]
+                here = [run.starts.copy() for run in runs]
                 problem.move_starts(current, step)
                 vector[columns] += step
                 with np.errstate(all="ignore"):
-                    current = condensed(
-                        [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
-                    )
+                    before_step = shown
+                    shown = [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
+                    if horizon == 1:
+                        shown = [
+                            held_back(problem, run, vector, *parts)
+                            for run, *parts in zip(runs, here, before_step, shown, strict=True)
+                        ]
+                    current = condensed(shown)
                 new = current.cost + prior(vector)
                 if not np.isfinite(new):
                     cost = np.inf
@@ -157,6 +164,8 @@ def fit(
         held = settled and abs(promise - gain) < max(FAITHFUL * gain, small)
         if held or (renew and not np.isfinite(before)):
             break
+        if gain == 0:
+            damping = 0.0  # of slopes that did not hold
         if renew and (gain < small or (iteration + 1 >= iterations and gain < SLOW * before)):
             break
         renew = True
@@ -167,3 +176,23 @@ def fit(
         damping = 0.0
         normal = condensed(linears)
     return Fit(vector, freedom, kept[0], prior(vector), normal)
+
+
+def held_back(
+    problem: Problem,
+    run: Run,
+    vector: np.ndarray,
+    starts: np.ndarray,
+    before: Linearised,
+    now: Linearised,
+) -> Linearised:
+    """What the run shows `now`, after a step from `starts`, with pieces that ran away put back to there.
+
+    One piece says nothing of the next, and need not spoil a step that suits the others.
+    """
+    were, are = (np.mean(part.residual**2, (1, 2)) for part in (before, now))
+    away = ~(are < RAN_AWAY * (1 + were))
+    if not away.any():
+        return now
+    run.starts[away] = starts[away]
+    return problem.refresh(run, vector, now)

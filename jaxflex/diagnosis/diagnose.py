@@ -8,7 +8,7 @@ from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe, nominally
 from .find import HALFWAY, find
-from .foretell import AT_FLOOR
+from .foretell import AT_FLOOR, noise
 from .gauge import BY_GAUGE, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
 from .loose_joint import loose_joints
@@ -47,14 +47,21 @@ def diagnose(
         say("the runs held out show what the others do not: the end of each is held out instead")
         chosen = study(file, divided)
     stated = nominally(chosen)
-    gauged = by_gauge(file) if _astray(chosen) > CLOSE and _shows_deflection(chosen) else None
-    if gauged is not None:
+
+    def gauged(chosen: Study) -> Study:
+        file = by_gauge(chosen.file) if _astray(chosen) > CLOSE and _deflections(chosen) else None
+        if file is None:
+            return chosen
         say("the deflections may be those that a strain gauge stands for")
-        other = study(gauged, divided)
-        if _astray(other) < HALFWAY * _astray(chosen):
-            chosen = other
-            chosen.notes = (*chosen.notes, BY_GAUGE)
-    if _leaves_much(chosen):
+        other = study(file, divided)
+        if not _astray(other) < HALFWAY * _astray(chosen):
+            return chosen
+        other.notes = (*other.notes, BY_GAUGE)
+        return other
+
+    def loosened(chosen: Study) -> Study:
+        if not _leaves_much(chosen):
+            return chosen
         say("what is left may lie between a motor and its link")
         for loose, start in loose_joints(chosen.file, recordings, divided, say):
             loose.outcome = find(loose.search, start)
@@ -62,6 +69,11 @@ def diagnose(
                 loose.outcome.nominal_level = chosen.outcome.nominal_level  # of the arm as it was stated
                 loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
                 chosen = loose
+        return chosen
+
+    likely = (gauged, loosened) if _astray_in_deflection(chosen) else (loosened, gauged)
+    for other_arm in likely:
+        chosen = other_arm(chosen)
     weigh(chosen.search, chosen.outcome)
     return describe(chosen, stated, began)
 
@@ -72,8 +84,15 @@ def _astray(study: Study) -> float:
     return final.costs[HORIZONS[0]] / final.fit.count
 
 
-def _shows_deflection(study: Study) -> bool:
-    return any(name.startswith("tip_deflection") for name in study.prepared.problem.setting.channels)
+def _deflections(study: Study) -> list[str]:
+    return [name for name in study.prepared.problem.setting.channels if name.startswith("tip_deflection")]
+
+
+def _astray_in_deflection(study: Study) -> bool:
+    """True if the channel farthest from what was foretold is a deflection."""
+    floor = noise(study.prepared.problem)
+    errors = study.foretold().errors
+    return max(errors, key=lambda name: errors[name] / floor[name]) in _deflections(study)
 
 
 def _leaves_much(study: Study) -> bool:

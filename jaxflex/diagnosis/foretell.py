@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .calibrate import Freedom, fit
+from .flanks import choose_flanks
 from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
-from .shooting import Problem, Run
+from .shooting import LOST_PIECE, Problem, Run
 
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 
@@ -50,6 +51,10 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
                 problem.join(run, vector)
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
+            if horizon == HORIZONS[0]:
+                for effect in hypothesis.effects:
+                    if effect.effect == "backlash":
+                        choose_flanks(problem, [run], vector, effect.index, LOST_PIECE)
         reading = problem.predict(run, vector).reading
         lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
         # a motion that cannot be followed counts as if nothing had been foretold of it

@@ -6,84 +6,91 @@ nothing else explains what was measured.
 """
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
-
-import numpy as np
 
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
-from .hypothesis import Hypothesis, Search, adopt, freedom
+from .flanks import choose_flanks, press
+from .hypothesis import CLOSE, Hypothesis, Search, adopt, freedom
 from .parameters import Parameters
+from .shooting import LOST_PIECE
 from .study import Say, Study
 
-GUESSES = {  # of CONTACT: value, and relative uncertainty
-    "contact_stiffness": (100.0, 0.5),  # N m/rad
-    "contact_damping": (0.03, 1.0),  # N m s/rad
+FLANKS = {  # of CONTACT: value, and relative uncertainty
+    "contact_stiffness": (30.0, 1.5),  # N m/rad; a fit finds its way from soft flanks to hard ones, not back
+    "contact_damping": (0.03, 1.5),  # N m s/rad
     "motor_share": (0.6, 0.3),
 }
-GAPS = (0.002, 0.004, 0.008, 0.016, 0.032, 0.064)  # rad
-COMPLIANCES = (0.02, 0.1, 0.5)  # rad/(N m)
-FITTED = 3  # of the trials, those that fit best as they are
+SPRING = {  # the same, of a joint whose flexibility is all there is: hard flanks without play
+    "contact_stiffness": (1e3, 0.0),
+    "contact_damping": (1e-3, 1.5),
+    "motor_share": (0.6, 0.3),
+}
+COMPLIANCE = 0.1  # rad/(N m), to start from
+GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
+GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
+TURNS = 3  # of trying the other flank and fitting again
+HELPS = 0.9  # of the cost: a turn that leaves more has not helped
 
 
-def loosened(file: ArmFile, joint: int) -> ArmFile:
-    """The arm with motor and link of a joint apart, tied by a stiff spring."""
-    values = {name: value for name, (value, _) in GUESSES.items()}
+def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]]) -> ArmFile:
+    """The arm with motor and link of a joint apart, tied by this contact."""
+    values = {name: value for name, (value, _) in contact.items()}
     joints = list(file.arm.joints)
     joints[joint] = dataclasses.replace(joints[joint], play=0.0, **values)
     arm = dataclasses.replace(file.arm, joints=tuple(joints))
-    spread = {name: spread for name, (_, spread) in GUESSES.items()}
+    spread = {name: spread for name, (_, spread) in contact.items()}
     return dataclasses.replace(file, arm=arm, uncertainty=file.uncertainty | spread)
-
-
-def trials(joint: int) -> list[tuple[Candidate, float]]:
-    """What may be between motor and link, with the size to start from."""
-    location = f"joint_{joint + 1}"
-    return [
-        *((Candidate("backlash", location, ("gap",)), gap) for gap in GAPS),
-        *((Candidate("joint_flexibility", location, ("compliance",)), size) for size in COMPLIANCES),
-    ]
 
 
 def loose_joints(
     file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Say
 ) -> list[tuple[Study, Hypothesis]]:
-    """For every joint, the best of its trials over the shortest horizon."""
+    """For every joint a spring between motor and link or, if that leaves something, what fits best.
+
+    Over the shortest horizon.
+    """
     found = []
     for joint, own in enumerate(file.arm.joints):
         lumped = any(getattr(link, "model", "") == "lumped" for link in file.arm.links[joint : joint + 1])
         if lumped or own.play is not None:
             continue
-        study = Study(loosened(file, joint), recordings, divided, say)
-        search = study.search
-        straight = search.settle(search.parameters.start)
-        places = [(straight.vector, search.starts())]
-        bent = search.climb((), straight.vector, to=1)
-        places.append((bent.fit.vector, search.starts()))
+        spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
+        play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
-        for (candidate, size), (vector, starts) in itertools.product(trials(joint), places):
-            search.restart(starts)
-            with_it = adopt(search.parameters, vector, candidate, (size,))
-            if candidate.effect == "backlash":
-                press(search, with_it, joint, size)
-            settled = search.settle(with_it)
-            tried.append((settled.cost, len(tried), candidate, settled.vector, search.starts()))
-        best = None
-        for _, _, candidate, vector, starts in sorted(tried)[:FITTED]:
-            search.restart(starts)
-            contact = contact_columns(search.parameters, candidate)
-            close = fit(search.problem, search.runs, vector, contact, 1, 2).vector
-            fitted = search.climb((candidate,), close, to=1, iterations=8)
+        for contact, candidate, sizes in ((SPRING, spring, (COMPLIANCE,)), (FLANKS, play, GAPS)):
+            study = Study(loosened(file, joint, contact), recordings, divided, say)
+            fitted = best_from(study.search, candidate, sizes)
             say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
-            if best is None or fitted.fit.cost < best[0].fit.cost:
-                best = fitted, search.starts()
-        assert best is not None
-        search.restart(best[1])
-        found.append((study, best[0]))
+            tried.append((study, fitted))
+            if file.arm.links and fitted.fit.level < GONE:
+                break
+        found.append(min(tried, key=lambda entry: entry[1].fit.cost))
     return found
+
+
+def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> Hypothesis:
+    """The candidate fitted from the best of some sizes: with its contact as guessed, then with everything.
+
+    From the parameters as stated: a misfit that a loose joint leaves bends them.
+    """
+    stated = search.settle(search.parameters.start)
+    starts = search.starts()
+    first = without_contact(search.parameters, candidate)
+    begun = []
+    for size in sizes:
+        search.restart(starts)
+        with_it = adopt(search.parameters, stated.vector, candidate, (size,))
+        if candidate.effect == "backlash":
+            press(search.problem, search.runs, with_it, candidate.index)
+        settled = search.settle(with_it).vector
+        begun.append((fit(search.problem, search.runs, settled, first, 1), search.starts()))
+    best, starts = min(begun, key=lambda entry: entry[0].cost)
+    search.restart(starts)
+    fitted = search.climb((candidate,), best.vector, to=1, iterations=8)
+    return turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted
 
 
 def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:
@@ -93,12 +100,14 @@ def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:
     return parameters.arm.joints[effect.index].play is not None
 
 
-def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
-    """Leave to move the contact alone, with the rest of the arm as it is."""
+def without_contact(parameters: Parameters, candidate: Candidate) -> Freedom:
+    """Leave to move everything but the contact."""
     free = freedom(parameters, (candidate,))
     nominal = parameters.nominal
     own = [
-        k for k, column in enumerate(free.columns) if column >= len(nominal) or nominal[column].is_of_contact
+        k
+        for k, column in enumerate(free.columns)
+        if column >= len(nominal) or not nominal[column].is_of_contact
     ]
     return Freedom(
         tuple(free.columns[k] for k in own),
@@ -106,31 +115,16 @@ def contact_columns(parameters: Parameters, candidate: Candidate) -> Freedom:
     )
 
 
-def press(search: Search, vector: np.ndarray, joint: int, gap: float) -> None:
-    """Start every piece with the flank pressed that the moment of the bent link presses.
-
-    Where nothing bends, with that from which the piece fits better.
-    """
-    model = search.parameters.arm.assemble()
-    first = len(model.joints) + sum(link.shapes for link in model.links[:joint])
-    link = model.links[joint]
-    last = first + link.shapes - 1
-    if link.shapes > 1:
-        curvature = np.array([float(c) for c in link.gauge_curvature])
-        for run in search.runs:
-            run.starts[:, last] = np.sign(run.starts[:, first : last + 1] @ curvature) * gap / 2
-        return
-    before = search.starts()
-    found = []
-    for side in (-gap / 2, gap / 2):
-        search.restart(before)
-        for run in search.runs:
-            run.starts[:, last] = side
-        search.settle(vector)
-        misfits = [search.problem.misfit(run, search.problem.predict(run, vector)) for run in search.runs]
-        found.append((search.starts(), misfits))
-    (lower, at_lower), (upper, at_upper) = found
-    for k, run in enumerate(search.runs):
-        better = at_lower[k] < at_upper[k]
-        run.starts = np.where(better[:, None], lower[k][0], upper[k][0])
-        run.slopes = None
+def turned(search: Search, fitted: Hypothesis, joint: int) -> Hypothesis:
+    """Fitted again with the pieces that are lost begun at the flank that suits them, while that helps."""
+    for _ in range(TURNS):
+        if fitted.fit.level < CLOSE:
+            break
+        starts = search.starts()
+        choose_flanks(search.problem, search.runs, fitted.fit.vector, joint, LOST_PIECE)
+        again = search.climb(fitted.effects, fitted.fit.vector, to=1, iterations=8)
+        if not again.fit.cost < HELPS * fitted.fit.cost:
+            search.restart(starts)
+            break
+        fitted = again
+    return fitted

@@ -107,6 +107,15 @@ class Parameters:
             if issubclass(EFFECTS[part.effect], AbstractDryFriction) and part.field in ("torque", "level")
         )
 
+    @property
+    def plays(self) -> tuple[int, ...]:
+        """Places of the gaps of joints that are loose."""
+        return tuple(
+            self.position("backlash", f"joint_{joint + 1}", "gap")
+            for joint, own in enumerate(self.arm.joints)
+            if own.play is not None
+        )
+
     def build(self, vector: Float[Array, " parameters"]) -> Arm:
         """The arm with the parameters of `vector`; differentiable."""
         moved: dict[int, tuple[Callable[[Any], Any], Any]] = {}

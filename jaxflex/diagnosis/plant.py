@@ -9,11 +9,13 @@ serves every horizon: long runs are pieces joined end to end by linear algebra.
 # arrays of numpy go to JAX and come back, which its annotations do not foresee
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 
+import math
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..arm.arm import AssembledArm
@@ -25,6 +27,8 @@ from ..kept import kept
 from ..scalars import Scalar
 from ..sensors import read_channels
 from .dry_friction import Stepping, dry_friction
+
+LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
 
 
 class Instruments(NamedTuple):
@@ -176,6 +180,26 @@ def interval(
     before = truth(model, channels, t, x, command, friction)
     y, dry = jax.lax.fori_loop(0, stepping.substeps, substep, (x, none))
     return y, dry, before, truth(model, channels, t + sample_time, y, command, dry)
+
+
+@kept
+def _slopes_at_rest(model: AssembledArm) -> Float[Array, "states states"]:
+    zero = jnp.zeros(())
+    command, force = (zero,) * len(model.joints), (zero,) * model.size
+
+    def slope(x):
+        return jnp.stack(derivative(model, zero, tuple(x), command, force))
+
+    return jax.jacfwd(slope)(jnp.zeros(state_size(model, ())))
+
+
+def substeps_for(model: AssembledArm, sample_time: float) -> int:
+    """Runge-Kutta steps in a sample interval that resolve the fastest motion of the arm at rest."""
+    slopes = np.asarray(_slopes_at_rest(model))
+    if not np.isfinite(slopes).all():
+        return 1  # parameters for which there is no motion, whatever the steps
+    fastest = float(np.abs(np.linalg.eigvals(slopes)).max())
+    return max(1, math.ceil(fastest * sample_time / LIMIT))
 
 
 class Lag(NamedTuple):

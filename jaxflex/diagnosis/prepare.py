@@ -4,11 +4,8 @@
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false, reportOptionalOperand=false
 
 import dataclasses
-import math
 from collections.abc import Sequence
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.signal import savgol_filter
 
@@ -20,13 +17,12 @@ from ..files.recording import Recording, RecordingError
 from .catalogue import template
 from .noise import noise_floors
 from .parameters import Parameters
-from .plant import derivative, state_size
+from .plant import state_size, substeps_for
 from .shooting import Problem, Run, Setting
 
 OUTPUTS = ("angle", "rate", "current", "tip_deflection", "strain", "tip_acceleration")
 PIECE = 0.1  # s: the shortest horizon
 SHORTEST_PIECE = 10  # samples
-LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
 SMALLEST_NOISE = 2e-4  # of a channel's spread: no model is better than that
 SAMPLES = 25_000  # of one recording that are used
@@ -113,7 +109,7 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording], divided: bool =
     colour = [np.array([1.0, *(-a for a in floors[name].ar)]) for name in outputs]
     length = max(round(PIECE / step), SHORTEST_PIECE)
     effects = template(arm, outputs, _transition_rates(arm, pieces, step))
-    substeps = substeps_for(dataclasses.replace(arm, effects=()), step)
+    substeps = substeps_for(dataclasses.replace(arm, effects=()).assemble(), step)
     parameters = Parameters(file, effects)
     model = parameters.arm.assemble()
     setting = Setting(
@@ -167,20 +163,6 @@ def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[
                 rates.append(float(np.std((angle[window:] - angle[:-window]) / (window * dt))))
         found.append(0.02 * float(np.mean(rates[1:] or rates)))
     return found
-
-
-def substeps_for(arm: Arm, sample_time: float) -> int:
-    """Runge-Kutta steps in a sample interval that resolve the fastest motion of the arm at rest."""
-    model = arm.assemble()
-    zero = jnp.zeros(())
-    command, force = (zero,) * len(arm.joints), (zero,) * model.size
-
-    def slope(x):
-        return jnp.stack(derivative(model, zero, tuple(x), command, force))
-
-    jacobian = jax.jit(jax.jacfwd(slope))(jnp.zeros(state_size(model, ())))
-    fastest = float(np.abs(np.linalg.eigvals(np.asarray(jacobian))).max())
-    return max(1, math.ceil(fastest * sample_time / LIMIT))
 
 
 def first_starts(

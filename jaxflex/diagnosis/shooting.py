@@ -22,12 +22,13 @@ from scipy.signal import lfilter
 from .delay import delayed
 from .normal import Normal, solve
 from .parameters import Parameters
-from .plant import Instruments, Pieces, Response, Stepping, respond
+from .plant import Instruments, Pieces, Response, Stepping, respond, substeps_for
 from .steps import LANES, Intervals, Point, Steps, along_pieces
 
 LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
+MOST_SUBSTEPS = 24  # in a sample, where a contact is stiff
 DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
 
 
@@ -121,14 +122,20 @@ class Problem:
 
     def stepping(self, vector: np.ndarray) -> Stepping:
         """How a sample interval is integrated for these parameters."""
-        s = self.setting
-        dry = s.parameters.has_dry_friction(vector)
-        joints = len(s.parameters.lightness)
+        parameters = self.setting.parameters
+        dry, joints = parameters.has_dry_friction(vector), len(parameters.lightness)
+        substeps = self.setting.substeps
+        if parameters.plays:
+            # what ties a loose joint is hardly known; where more were needed the motion is lost
+            touching = vector.copy()
+            touching[list(parameters.plays)] = 0.0
+            model = self._model(jnp.asarray(touching))
+            substeps = min(substeps_for(model, self.setting.sample_time), MOST_SUBSTEPS)
         return Stepping(
-            jnp.asarray(max(s.substeps, DRY_SUBSTEPS) if dry else s.substeps),
+            jnp.asarray(max(substeps, DRY_SUBSTEPS) if dry else substeps),
             # joints that stick move one another until they agree
             jnp.asarray((1 + joints if joints > 1 else 2) if dry else 1),
-            jnp.asarray(s.parameters.lightness),
+            jnp.asarray(parameters.lightness),
         )
 
     def instruments(self, vector: np.ndarray) -> Instruments:
@@ -309,10 +316,8 @@ class Problem:
         columns = linear.by_column.shape[-1]
         states = run.starts.shape[1]
         total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0, 0)
-        cuts = np.unique(
-            np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round().astype(int)
-        )
-        for first, last in itertools.pairwise(cuts):
+        cuts = np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round()
+        for first, last in itertools.pairwise(np.unique(cuts.astype(int))):
             by_start, by_column, offset = np.eye(states), np.zeros((states, columns)), np.zeros(states)
             rows, kept = [], []
             for j in range(first, last):

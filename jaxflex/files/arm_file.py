@@ -144,7 +144,7 @@ def _link(fields: Fields) -> Link:
             "gauge_position", 0.0, "a number from 0 to the length", lambda x: 0 <= x <= (length or 0)
         ),
         root_stiffness=fields.not_negative("root_stiffness"),
-        root_compliance=fields.not_negative("root_compliance"),
+        root_compliance=fields.not_negative("root_compliance", None),
         shortening=fields.not_negative("shortening", None),
         motion=fields.choice("motion", "finite", list(MOTIONS)),
         deflection_from=fields.choice("deflection_from", "tip", list(INSTRUMENTS)),
@@ -192,7 +192,7 @@ def _joint(fields: Fields, file: str, number: int) -> Joint:
         hub_mass=fields.not_negative("hub_mass"),
         viscous_friction=fields.not_negative("viscous_friction"),
         rotor_inertia=fields.not_negative("rotor_inertia"),
-        compliance=fields.not_negative("compliance"),
+        compliance=fields.not_negative("compliance", None),
         play=fields.not_negative("play", None),
         contact_stiffness=fields.number("contact_stiffness"),
         contact_damping=fields.not_negative("contact_damping"),
