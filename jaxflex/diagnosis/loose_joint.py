@@ -28,7 +28,7 @@ SPRING = {  # the same, of a joint whose flexibility is all there is: hard flank
     "contact_damping": (1e-3, 1.5),
     "motor_share": (0.6, 0.3),
 }
-COMPLIANCE = 0.1  # rad/(N m), to start from
+COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
 TURNS = 3  # of trying the other flank and fitting again
@@ -60,7 +60,7 @@ def loose_joints(
         spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
-        for contact, candidate, sizes in ((SPRING, spring, (COMPLIANCE,)), (FLANKS, play, GAPS)):
+        for contact, candidate, sizes in ((SPRING, spring, COMPLIANCES), (FLANKS, play, GAPS)):
             study = Study(loosened(file, joint, contact), recordings, divided, say)
             fitted = best_from(study.search, candidate, sizes)
             say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
