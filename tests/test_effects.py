@@ -131,8 +131,8 @@ def test_play_keeps_its_energy_and_lets_the_link_turn_freely():
     run = jf.simulate(
         arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start, method=jf.Adaptive(rtol=1e-9)
     )
-    # a turn is followed to its second order
-    np.testing.assert_allclose(run.state.q[2], times, rtol=0.04**2 / 2, atol=1e-9)
+    # a turn is followed to its second order; left out is `eta^3 / 6`, that of a sine, at most
+    np.testing.assert_allclose(run.state.q[2], times, rtol=0.04**2 / 6, atol=1e-9)
     model = arm.assemble()
 
     def energy(q, qd):

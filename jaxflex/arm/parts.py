@@ -166,11 +166,14 @@ class Link(AbstractLink):
     def _shortening(self, joint: "Joint") -> Scalar | None:
         """The share of bending in it; None if neither bending nor a turn of the root takes off any length."""
         turns = any(part is not None for part in (joint.play, joint.compliance, self.root_compliance))
-        return scalar(0.0) if self.shortening is None and turns and not self.moves_little else self.shortening
+        if self.shortening is None and turns and not self.moves_little:
+            return scalar(0.0)
+        return self.shortening
 
     def _constants(self, distal: Distal, carries_link: bool, joint: "Joint") -> LinkModel:
         if self.modes == 0:
-            return rigid_link(self.length, self.mass, joint.play is not None)
+            keeps_length = self._shortening(joint) is not None
+            return rigid_link(self.length, self.mass, joint.play is not None, keeps_length)
         if self.model == "lumped":
             if joint.play is not None:
                 raise ValueError(

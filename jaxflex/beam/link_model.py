@@ -84,11 +84,11 @@ def symmetric_form(rows: tuple[tuple[Scalar, ...], ...], a: tuple) -> Scalar | f
     return total
 
 
-def rigid_link(length: Scalar, mass: Scalar, loose: bool = False) -> LinkModel:
+def rigid_link(length: Scalar, mass: Scalar, loose: bool = False, keeps_length: bool = False) -> LinkModel:
     """A uniform link that does not bend (the limit of rising stiffness).
 
     A `loose` one has a single shape, its rotation in the play of the joint; of no length and
-    mass it is what a motor axis drives.
+    mass it is what a motor axis drives. `keeps_length`: its turn is followed to second order.
     """
     first, second = mass * length / 2, mass * length**2 / 3
     none: tuple[Scalar, ...] = ()
@@ -97,7 +97,7 @@ def rigid_link(length: Scalar, mass: Scalar, loose: bool = False) -> LinkModel:
     zero, one = (jnp.zeros_like(length),), (jnp.ones_like(length),)
     return LinkModel(
         length, mass, first, second, (first,), (second,), ((second,),), zero, zero, (length,), one, zero, one,
-        shortening=Shortening(((length,),), ((first,),), ((second,),)), loose=True,
+        shortening=Shortening(((length,),), ((first,),), ((second,),)) if keeps_length else None, loose=True,
     )  # fmt: skip
 
 
@@ -130,9 +130,9 @@ def assumed_modes_link(
     """The link whose deflection is a sum over `basis` (Ahmad et al. (19), Foldager et al. (8)).
 
     `joint_compliance` [rad/(N m)] is the joint's part of the basis' root compliance;
-    `shortening` the share of what bending takes off the length that is counted, beside what a turn of
-    the root takes off (None: neither is); a `loose` link has one
-    more shape, the rotation of its root in the play of the joint.
+    `shortening` the share of what bending takes off the length that is counted, beside what
+    a turn of the root takes off (None: neither is); a `loose` link has one more shape, the
+    rotation of its root in the play of the joint.
     """
     length = basis.modes.length
     points, weights = quadrature(length)

@@ -5,8 +5,7 @@ No reading shows it, and a fit by slopes does not cross the gap: the other flank
 
 import numpy as np
 
-from .calibrate import Freedom, fit
-from .hypothesis import restart, starts_of
+from .hypothesis import restart, settle, starts_of
 from .shooting import Problem, Run
 
 
@@ -41,7 +40,7 @@ def choose_flanks(
         restart(runs, first)
         for run, misfit in zip(runs, before, strict=True):
             run.starts[misfit > lost, twist] = side
-        fit(problem, runs, vector, Freedom.full([]), 1, 2)
+        settle(problem, runs, vector)
         for k, (run, misfit) in enumerate(zip(runs, misfits(), strict=True)):
             better = misfit < best[k][1]
             best[k] = np.where(better[:, None], run.starts, best[k][0]), np.where(better, misfit, best[k][1])
@@ -54,4 +53,4 @@ def _play(problem: Problem, vector: np.ndarray, joint: int) -> tuple[int, float]
     parameters = problem.setting.parameters
     model = parameters.arm.assemble()
     twist = len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1
-    return twist, float(vector[parameters.position("backlash", f"joint_{joint + 1}", "gap")])
+    return twist, float(vector[parameters.plays[joint]])

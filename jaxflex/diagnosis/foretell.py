@@ -43,6 +43,7 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
         for name in effect.amplitudes
     ]
     held = Freedom.full(free)
+    plays = [effect.index for effect in hypothesis.effects if effect.effect == "backlash"]
     squares, predictions = [], []
     for run in runs:
         vector = hypothesis.fit.vector
@@ -51,10 +52,8 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
                 problem.join(run, vector)
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
-            if horizon == HORIZONS[0]:
-                for effect in hypothesis.effects:
-                    if effect.effect == "backlash":
-                        choose_flanks(problem, [run], vector, effect.index, LOST_PIECE)
+            for joint in plays if horizon == HORIZONS[0] else ():
+                choose_flanks(problem, [run], vector, joint, LOST_PIECE)
         reading = problem.predict(run, vector).reading
         lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
         # a motion that cannot be followed counts as if nothing had been foretold of it

@@ -157,6 +157,11 @@ def restart(runs: list[Run], starts: Starts) -> None:
         run.starts, run.slopes = kept.copy(), slopes
 
 
+def settle(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: int = 1) -> Fit:
+    """The starts of all pieces of these runs fitted alone, parameters held."""
+    return fit(problem, runs, vector, Freedom.full([]), horizon, 2)
+
+
 class Search:
     """Fits hypotheses to runs and ranks what each one misses."""
 
@@ -176,7 +181,7 @@ class Search:
 
     def settle(self, vector: np.ndarray, horizon: int = 1) -> Fit:
         """The starts alone, parameters held."""
-        return fit(self.problem, self.runs, vector, Freedom.full([]), horizon, 2)
+        return settle(self.problem, self.runs, vector, horizon)
 
     def climb(
         self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],

@@ -76,17 +76,18 @@ def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> H
 
     From the parameters as stated: a misfit that a loose joint leaves bends them.
     """
-    stated = search.settle(search.parameters.start)
+    stated = search.parameters.start
+    search.settle(stated)
     starts = search.starts()
     first = without_contact(search.parameters, candidate)
     begun = []
     for size in sizes:
         search.restart(starts)
-        with_it = adopt(search.parameters, stated.vector, candidate, (size,))
+        with_it = adopt(search.parameters, stated, candidate, (size,))
         if candidate.effect == "backlash":
             press(search.problem, search.runs, with_it, candidate.index)
-        settled = search.settle(with_it).vector
-        begun.append((fit(search.problem, search.runs, settled, first, 1), search.starts()))
+        search.settle(with_it)
+        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts()))
     best, starts = min(begun, key=lambda entry: entry[0].cost)
     search.restart(starts)
     fitted = search.climb((candidate,), best.vector, to=1, iterations=8)

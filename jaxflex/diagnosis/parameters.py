@@ -108,13 +108,13 @@ class Parameters:
         )
 
     @property
-    def plays(self) -> tuple[int, ...]:
-        """Places of the gaps of joints that are loose."""
-        return tuple(
-            self.position("backlash", f"joint_{joint + 1}", "gap")
+    def plays(self) -> dict[int, int]:
+        """Places of the gaps of the joints that are loose, by joint."""
+        return {
+            joint: self.position("backlash", f"joint_{joint + 1}", "gap")
             for joint, own in enumerate(self.arm.joints)
             if own.play is not None
-        )
+        }
 
     def build(self, vector: Float[Array, " parameters"]) -> Arm:
         """The arm with the parameters of `vector`; differentiable."""

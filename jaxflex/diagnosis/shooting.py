@@ -128,7 +128,7 @@ class Problem:
         if parameters.plays:
             # what ties a loose joint is hardly known; where more were needed the motion is lost
             touching = vector.copy()
-            touching[list(parameters.plays)] = 0.0
+            touching[list(parameters.plays.values())] = 0.0
             model = self._model(jnp.asarray(touching))
             substeps = min(substeps_for(model, self.setting.sample_time), MOST_SUBSTEPS)
         return Stepping(
