@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .chains import Linearised
 from .normal import Normal, solve
-from .shooting import Linearised, Problem, Run
+from .shooting import Problem, Run
 
 CHORDS = 5  # steps with the same slopes; each needs only a run of the model
 MOST = 15  # iterations, however well they do

@@ -15,6 +15,7 @@ from .parameters import Parameters
 SUSPECT = 0.99  # of arms as stated, the share whose parameters depart less: beyond it parts are tried
 BENT = 0.999  # the same, beyond which something is missing
 FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
+MOST_ERROR = 2.5  # times the usual departure: what such an error is excused for before parts have been tried
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 
 
@@ -40,9 +41,14 @@ def departure(parameters: Parameters, hypothesis: Hypothesis) -> float:
     return float(max(np.sqrt(np.mean(moved**2)), FARTHEST * farthest))
 
 
-def is_suspect(parameters: Parameters, hypothesis: Hypothesis) -> bool:
-    """True if the parameters went far enough to imitate a part of the arm that is not as stated."""
-    return departure(parameters, hypothesis) > _usual(SUSPECT, _stated(parameters))
+def is_suspect(parameters: Parameters, hypothesis: Hypothesis, explained: float = 0.0) -> bool:
+    """True if the parameters went far enough to imitate a part of the arm that is not as stated.
+
+    `explained` as for `is_bent`.
+    """
+    usual = _usual(SUSPECT, _stated(parameters))
+    error = min(_error(parameters, hypothesis, explained), MOST_ERROR * usual)
+    return bool(departure(parameters, hypothesis) > np.hypot(usual, error))
 
 
 def is_bent(parameters: Parameters, hypothesis: Hypothesis, explained: float) -> bool:
@@ -51,13 +57,19 @@ def is_bent(parameters: Parameters, hypothesis: Hypothesis, explained: float) ->
     `explained`: the cost that the effects account for. No law of friction or contact is the true
     one, and parameters make up for its error as far as that may reach.
     """
+    usual = _usual(BENT, _stated(parameters))
+    return bool(
+        departure(parameters, hypothesis) > np.hypot(usual, _error(parameters, hypothesis, explained))
+    )
+
+
+def _error(parameters: Parameters, hypothesis: Hypothesis, explained: float) -> float:
+    """How far parameters go to make up for the error of a law of friction or contact."""
     touches = any(
         issubclass(EFFECTS[effect.effect], AbstractDryFriction) or is_of_loose_joint(parameters, effect)
         for effect in hypothesis.effects
     )
-    stated = _stated(parameters)
-    error = FORM_ERROR**2 * max(explained, 0.0) if touches else 0.0
-    return bool(departure(parameters, hypothesis) > np.hypot(_usual(BENT, stated), np.sqrt(error / stated)))
+    return FORM_ERROR * float(np.sqrt(max(explained, 0.0) / _stated(parameters))) if touches else 0.0
 
 
 def _stated(parameters: Parameters) -> int:

@@ -3,7 +3,6 @@
 from ..effects import EFFECTS
 from .departure import is_suspect
 from .hypothesis import (
-    CHANCE,
     CLOSE,
     FAIR,
     HORIZONS,
@@ -20,11 +19,13 @@ from .rivals import prune
 
 MOST_EFFECTS = 5
 SHORT_LIST = 3
+SOME = 3  # one in so many pieces tells parts of the arm apart
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
 FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
+UNLIKELY = 12.0  # gain of a part that sets strained parameters straight: one arm in a hundred strains
 HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
 
 Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
@@ -60,7 +61,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         long = (levels[0] - levels[-1]) * fitted.fit.count
         explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
         near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
-        suspect = start is None and is_suspect(search.parameters, fitted)
+        suspect = start is None and is_suspect(search.parameters, fitted, outcome.explained)
         if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not suspect:
             break
         horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
@@ -87,16 +88,15 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         confirm(tried, before, before_starts)
         if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
             search.restart(base_starts)
-            straight, straight_starts = straightened(search, base)
-            parts = sift(search, straight, straight_starts, search.parts(straight.effects))
-            confirm(parts, straight, straight_starts)
+            stated, stated_starts = straightened(search, base)
+            parts = sift(search, stated, stated_starts, search.parts(stated.effects))
+            confirm(parts, stated, stated_starts)
         confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
         if not confirmed:
             break
         strength, best, best_starts = simplest(search, confirmed)
-        straightens = (
-            suspect and not is_suspect(search.parameters, best) and best.gain(fitted) > STRONG * CHANCE
-        )
+        straight = not is_suspect(search.parameters, best, outcome.explained)
+        straightens = suspect and straight and best.gain(fitted) > UNLIKELY
         if not (strength > STRONG or straightens):
             break
         base, base_starts = best, best_starts
@@ -129,11 +129,15 @@ def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
 def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) -> list[Ranked]:
     """The few that explain most over the shortest horizon, each fitted in full.
 
-    Parameters that were bent to imitate an effect mislead a test to first order.
+    Parameters that were bent to imitate an effect mislead a test to first order. A part of the pieces
+    says as well as all which of them it is.
     """
     best: dict[tuple[str, str], tuple[float, Ranked]] = {}
+    search.restart(starts)
+    few = Search(search.problem, [run.thinned(SOME) for run in search.runs], search.say)
+    starts = few.starts()
     for item in items:
-        cost = search.confirm(base, starts, item, HORIZONS[0]).fit.cost
+        cost = few.confirm(base, starts, item, HORIZONS[0]).fit.cost
         if item.candidate.key not in best or cost < best[item.candidate.key][0]:
             best[item.candidate.key] = cost, item
     return [item for _, item in sorted(best.values(), key=lambda entry: entry[0])][:SHORT_LIST]

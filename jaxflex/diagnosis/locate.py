@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Motion, index
+from .chains import LOST, Linearised
 from .normal import solve
-from .shooting import LOST, Linearised, Problem, Run
+from .shooting import Problem, Run
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece

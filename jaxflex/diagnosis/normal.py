@@ -45,3 +45,16 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
             return np.full_like(tall, np.inf)
         found = np.linalg.lstsq(tidy, tall, rcond=1e-13)[0]
     return (found.T / scale).T
+
+
+def solve_all(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """`solve` of each of a stack of matrices."""
+    scale = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), 1e-300))
+    try:
+        found = np.linalg.solve(matrices / (scale[:, :, None] * scale[:, None]), right / scale[..., None])
+        found /= scale[..., None]
+    except np.linalg.LinAlgError:
+        found = np.full_like(right, np.nan)
+    for k in np.flatnonzero(~np.isfinite(found).all((1, 2))):
+        found[k] = solve(matrices[k], right[k])
+    return found

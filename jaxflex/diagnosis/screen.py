@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .catalogue import Candidate, Motion
+from .chains import Linearised
 from .normal import Normal, solve
-from .shooting import Linearised, Problem, Run
+from .shooting import Problem, Run
 
 
 @dataclass(frozen=True)

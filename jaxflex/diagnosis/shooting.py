@@ -10,22 +10,20 @@ a whole run (Bock's direct multiple shooting).
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 
 import dataclasses
-import itertools
 from dataclasses import dataclass
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.signal import lfilter
 
+from .chains import Linearised, condense
 from .delay import delayed
-from .normal import Normal, solve
+from .normal import Normal
 from .parameters import Parameters
 from .plant import Instruments, Pieces, Response, Stepping, respond, substeps_for
 from .steps import LANES, Intervals, Point, Steps, along_pieces
 
-LOST = 1e100  # beyond it a motion, or its slope, has left all bounds
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
 MOST_SUBSTEPS = 24  # in a sample, where a contact is stiff
@@ -43,13 +41,14 @@ class Slopes:
 
 @dataclass
 class Run:
-    """A recording cut into pieces, with the states its pieces start from."""
+    """A recording cut into pieces, every `stride`-th of which counts, with the states that these start from."""
 
     times: np.ndarray  # (samples,)
     command: np.ndarray  # (samples, joints), as logged
     reading: np.ndarray  # (pieces, samples, channels)
     valid: np.ndarray  # (pieces, samples)
     starts: np.ndarray  # (pieces, states)
+    stride: int = 1
     slopes: Slopes | None = None
     point: Point | None = None
 
@@ -57,6 +56,11 @@ class Run:
     def pieces(self) -> int:
         """Number of pieces."""
         return self.reading.shape[0]
+
+    def thinned(self, stride: int) -> "Run":
+        """Every `stride`-th piece alone, enough for fits over the shortest horizon."""
+        kept = (part[::stride] for part in (self.reading, self.valid, self.starts.copy()))
+        return Run(self.times, self.command, *kept, stride=stride)
 
 
 @dataclass
@@ -71,18 +75,6 @@ class Setting:
     length: int  # samples in a piece
     substeps: int
     start_spread: np.ndarray  # how far a start may be from what was guessed, (states,)
-
-
-@dataclass
-class Linearised:
-    """A run made linear about its pieces: residuals and slopes in units of the noise."""
-
-    residual: np.ndarray  # (pieces, samples, channels)
-    by_start: np.ndarray  # (pieces, samples, channels, states)
-    by_column: np.ndarray  # (pieces, samples, channels, columns)
-    end_by_start: np.ndarray  # (pieces, states, states)
-    end_by_column: np.ndarray  # (pieces, states, columns)
-    gap: np.ndarray  # (pieces, states): where a piece ends, less where the next begins
 
 
 def _stacked(columns: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
@@ -161,13 +153,13 @@ class Problem:
             mean, slope = delayed(run.times, run.command[:, joint], delay, s.sample_time)
             columns.append(mean)
             rates.append(slope)
-        shape = (run.pieces, s.length)
-        total = run.pieces * s.length
+        total = -(-len(run.times) // s.length) * s.length
 
         def cut(values):
-            return np.pad(values, (0, total - len(values)), mode="edge").reshape(shape)
+            padded = np.pad(values, (0, total - len(values)), mode="edge")
+            return padded.reshape(-1, s.length)[:: run.stride]
 
-        time = run.times[0] + np.arange(total).reshape(shape) * s.sample_time
+        time = run.times[0] + cut(np.arange(total)) * s.sample_time
         command = np.stack([cut(c) for c in columns], -1)
         slope = np.stack([cut(c) for c in rates], -1)
         stepping = self.stepping(vector)
@@ -308,59 +300,15 @@ class Problem:
         return Instruments(*(np.stack([r[k] - zero[k] for r in rows], -1) for k in range(4)))
 
     def condense(self, run: Run, linear: Linearised, horizon: int, damping: float = 0.0) -> Normal:
-        """Least squares in the columns, over horizons of `horizon` pieces, starts eliminated.
-
-        `damping` of the starts, as a share of what the readings say of them.
-        """
+        """Least squares in the columns over horizons of `horizon` pieces; `damping` as for `condense`."""
         s = self.setting
-        columns = linear.by_column.shape[-1]
-        states = run.starts.shape[1]
-        total = Normal(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0, 0)
-        cuts = np.linspace(0, run.pieces, max(round(run.pieces / horizon), 1) + 1).round()
-        for first, last in itertools.pairwise(np.unique(cuts.astype(int))):
-            by_start, by_column, offset = np.eye(states), np.zeros((states, columns)), np.zeros(states)
-            rows, kept = [], []
-            for j in range(first, last):
-                kept.append((j, by_start, by_column, offset))
-                slope = linear.by_start[j]
-                rows.append(
-                    np.concatenate(
-                        [slope @ by_start, linear.by_column[j] + slope @ by_column,
-                         (linear.residual[j] - slope @ offset)[..., None]], -1,
-                    )
-                )  # fmt: skip
-                through = linear.end_by_start[j]
-                by_start, by_column = through @ by_start, through @ by_column + linear.end_by_column[j]
-                offset = through @ offset + linear.gap[j]
-            table = np.concatenate(rows)
-            if not np.isfinite(table).all() or np.abs(table).max() > LOST:
-                total.cost = np.inf
-                return total
-            for c, filter_ in enumerate(s.colour):
-                if len(filter_) > 1:
-                    table[:, c] = lfilter(filter_, [1.0], table[:, c], axis=0)
-            table = table.reshape(-1, states + columns + 1)
-            gram = table.T @ table
-            a = slice(0, states)
-            b = slice(states, states + columns)
-            inner = gram[a, a] + np.diag(1 / s.start_spread**2 + damping * np.diag(gram[a, a]))
-            solved = solve(inner, gram[a, states:])
-            total = total + Normal(
-                gram[b, b] - gram[b, a] @ solved[:, :-1],
-                gram[b, -1] - gram[b, a] @ solved[:, -1],
-                gram[-1, -1],
-                float(gram[a, -1] @ solved[:, -1]),
-                int(run.valid[first:last].sum()) * len(s.channels),
-                [(run, kept, solved)],
-            )
-        return total
+        found = condense(linear, run.valid, horizon, s.colour, s.start_spread, damping)
+        return dataclasses.replace(found, back=[(run, joined) for joined in found.back])
 
     def move_starts(self, normal: Normal, step: np.ndarray) -> None:
         """Move the starts of all pieces as a step of the columns asks."""
-        for run, kept, solved in normal.back:
-            first = solved[:, -1] - solved[:, :-1] @ step
-            for j, by_start, by_column, offset in kept:
-                run.starts[j] = run.starts[j] + by_start @ first + by_column @ step + offset
+        for run, joined in normal.back:
+            joined.move(run.starts, step)
 
     def refresh(self, run: Run, vector: np.ndarray, linear: Linearised) -> Linearised:
         """The same slopes about where the run is now."""

@@ -159,6 +159,14 @@ def test_the_latent_force_is_the_force(prepared):
     assert np.sqrt(np.mean(first.values[outside] ** 2)) < 1.5e-3
 
 
+def test_every_third_piece_shows_what_it_shows_among_all(prepared):
+    problem, runs = prepared[0].problem, prepared[0].calibration
+    start = problem.setting.parameters.start
+    whole, some = problem.predict(runs[0], start), problem.predict(runs[0].thinned(3), start)
+    assert np.array_equal(some.reading, whole.reading[::3])
+    assert np.array_equal(some.end, whole.end[::3])
+
+
 def test_a_delayed_command_keeps_its_impulse():
     times = np.arange(50) * 0.01
     command = np.sin(9 * times)
