@@ -57,9 +57,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         if start is not None and not fitted.effects:
             base, base_starts = start, begin
             continue
-        short = outcome.nominal.costs[HORIZONS[0]] - fitted.costs[HORIZONS[0]]
-        long = (levels[0] - levels[-1]) * fitted.fit.count
-        explained = {h: short if h == HORIZONS[0] else max(short, h / HORIZONS[-1] * long) for h in HORIZONS}
+        explained = outcome.explained_over()
         near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
         suspect = start is None and is_suspect(search.parameters, fitted, outcome.explained)
         if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not suspect:

@@ -348,3 +348,9 @@ class Outcome:
         """Cost over the longest horizon that the effects account for, 0 if the motion was lost there."""
         gone = self.nominal_level - self.level
         return gone * self.final.fit.count if np.isfinite(gone) else 0.0
+
+    def explained_over(self) -> dict[int, float]:
+        """Cost that the effects account for over every horizon, at least what they do over the shortest."""
+        short = self.nominal.costs[HORIZONS[0]] - self.final.costs[HORIZONS[0]]
+        longer = {h: max(short, h / HORIZONS[-1] * self.explained) for h in HORIZONS[1:]}
+        return {HORIZONS[0]: short} | longer

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from .hypothesis import CLOSE, STRONG, Outcome, Search, without
+from .hypothesis import CLOSE, HORIZONS, STRONG, Outcome, Search, without
 from .loose_joint import is_of_loose_joint
 
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
@@ -47,9 +47,9 @@ def weigh(search: Search, outcome: Outcome) -> None:
             if rival.horizon != final.horizon or not search.sensible(rival):
                 continue
             lost = final.gain(rival)
-            explained = {final.horizon: share}  # a little of which another form of the same would explain too
-            same = lost < TIE * share and final.strength(rival, explained) < 1.0
-            better = lost < 0 and rival.strength(final, explained) > STRONG
+            # another form of what is there would explain a little more, whatever is there
+            same = lost < TIE * share and final.strength(rival, dict.fromkeys(HORIZONS, share)) < 1.0
+            better = lost < 0 and rival.strength(final, outcome.explained_over()) > STRONG
             simpler = same and item.candidate.count < effect.count
             if (better or simpler) and not is_of_loose_joint(search.parameters, effect):
                 search.say(
