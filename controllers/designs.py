@@ -149,9 +149,9 @@ def unshaped_design(
     return Design(controller, move, unshaped())
 
 
-def stack(designs: list[Design]) -> Design:
-    """Designs as one batched design, their shapers padded to the same number of impulses."""
-    longest = max(design.shaper.delays.shape[0] for design in designs)
+def stack(designs: list[Design], impulses: int = 1) -> Design:
+    """Designs as one batched design, their shapers padded to the same number of impulses, `impulses` at least."""
+    longest = max(impulses, *(design.shaper.delays.shape[0] for design in designs))
     padded = [eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs]
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 

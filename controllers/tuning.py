@@ -21,7 +21,8 @@ from jaxtyping import Array, PyTree
 from jaxflex import Scalar
 
 from .bijections import AbstractBijection
-from .minimise import Free, Minimum, Starts, Stepper, minimise
+from .judge import Free, Starts
+from .minimise import Minimum, Stepper, minimise
 from .task import Outcome
 
 KEPT = 1e-2  # relative excess up to which a constraint counts as kept
