@@ -127,7 +127,7 @@ def search_arm(arm: Arm) -> Arm:
 def make_problem(arm: Arm, masses: list[float], path: Move) -> Problem:
     """The tuning problem of an arm: its shaper takes 0.45 and the watch 2 periods of the lowest mode."""
     pose = jnp.stack(path.stop)
-    period = 1 / locked_frequencies(arm, pose)[0]
+    period = 1 / float(locked_frequencies(arm, pose)[0])
     coarse = search_arm(arm)
     start = textbook_pd(coarse, pose, feedforward=True)
     return Problem(coarse, jnp.asarray(masses), path, start, 0.45 * period, watch=2 * period)
