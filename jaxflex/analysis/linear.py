@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Complex, Float, Int
 
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference, Setpoint
@@ -168,7 +168,7 @@ def closed_loop_modes(linear: LinearModel) -> Modes:
 
 
 @one_off
-def _modes(a: Float[Array, "states states"]) -> tuple[Modes, Scalar]:
+def _modes(a: Float[Array, "states states"]) -> tuple[Modes, Int[Array, ""]]:
     """All poles as modes, those of negative imaginary part last, and how many come before these."""
     poles = jnp.linalg.eigvals(a)
     poles = poles[jnp.lexsort((jnp.abs(poles), poles.imag < 0))]

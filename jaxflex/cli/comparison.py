@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from controllers import (
+    CLASSICAL,
     Assessment,
     Design,
     Move,
@@ -26,6 +27,7 @@ from .tables import Table, number
 
 UNTUNED, TUNED = "PD, untuned", "tuned"
 STRETCHED = "PD, untuned, equal time"
+HALF = 2 + len(CLASSICAL)  # designs that owe nothing to a tuning; as many do
 
 
 @dataclasses.dataclass
@@ -52,7 +54,7 @@ class Contest:
     """What the designs are compared in: a move on the arm as given, stretched to `total` [s], over payloads.
 
     These are `masses` [kg] and those halfway between them; the search saw those `chosen`. Shapers are
-    padded to `impulses`, so that one program serves for any.
+    padded to `impulses` and designs to `HALF`, so that one program serves before and after a tuning.
     """
 
     arm: Arm
@@ -92,15 +94,19 @@ class Contest:
             held_out[:] = True  # a single payload: it is all there is to judge by
         watch = 2.0 / float(locked_frequencies(self.arm, jnp.stack(self.path.stop))[0])
         times = jnp.linspace(0.0, self.total + watch, 1201)
-        batch = stack(list(designs.values()), self.impulses)
-        found = assess(batch, with_payloads(self.arm, jnp.asarray(payloads)), times)
-        return Comparison(designs, payloads, held_out, *jax.tree_util.tree_map(np.asarray, found))
+        given = list(designs.values())
+        full = given + [given[-1]] * (HALF - len(given))
+        batch = stack(full, self.impulses), with_payloads(self.arm, jnp.asarray(payloads))
+        found = jax.tree_util.tree_map(
+            lambda x: jnp.asarray(np.asarray(x)[: len(given)]), assess(*batch, times)
+        )
+        return Comparison(designs, payloads, held_out, *found)
 
 
 def together(one: Comparison, other: Comparison) -> Comparison:
     """The designs of both; raises `SimulationError` where one could not be simulated."""
     assessment, trajectory = jax.tree_util.tree_map(
-        lambda *rows: np.concatenate(rows),
+        lambda *rows: jnp.asarray(np.concatenate(rows)),  # by numpy, which compiles nothing
         (one.assessment, one.trajectory),
         (other.assessment, other.trajectory),
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from matplotlib.figure import Figure
 
 from controllers import GAINS, Design, Tuned
@@ -84,8 +84,8 @@ def design_table(design: Design, arm: Arm) -> Table:
 
 
 @one_off
-def _spectra(times: Float[np.ndarray, " times"], signals: Float[np.ndarray, "payloads times"]):
-    return jax.vmap(lambda signal: spectrum(jnp.asarray(times), signal))(signals)
+def _spectra(times: Float[Array, " times"], signals: Float[Array, "payloads times"]) -> tuple[Array, Array]:
+    return jax.vmap(lambda signal: spectrum(times, signal))(signals)
 
 
 def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str, Picture]:
@@ -98,8 +98,8 @@ def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str,
     on = ~comparison.held_out if (~comparison.held_out).any() else comparison.held_out
     ends = [float(comparison.designs[name].move_time()) for name in (UNTUNED, TUNED)]
     late = times >= max(ends)
-    shake = path[f"tip_acceleration_{links}"][:, :, late]
-    ours, theirs = (_spectra(times[late], shake[k]) for k in (last, first))
+    shake = np.asarray(path[f"tip_acceleration_{links}"])[:, :, late]
+    ours, theirs = (_spectra(jnp.asarray(times[late]), jnp.asarray(shake[k])) for k in (last, first))
     residual = {name: comparison.of("residual_vibration", name) for name in names}
     lowest = 3.0 / (times[-1] - ends[1])
     payloads = comparison.payloads[on].tolist()
