@@ -3,12 +3,13 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxflex import (
     AbstractController,
     Arm,
     AssembledArm,
+    Modes,
     Scalar,
     ScalarLike,
     brief,
@@ -101,11 +102,18 @@ def ringing_mode(
     **Raises** `NoRinging` if none rings.
     """
     modes = closed_loop_modes(linearise(arm, pose, controller, ()))
-    rings = (modes.damping_ratio < OSCILLATORY) & (modes.frequency > 0)
-    if not bool(rings.any()):
+    rings, frequency, damping_ratio = _ringing(modes)
+    if not rings:
         raise NoRinging("no mode of the closed loop rings: a shaper has nothing to cancel.")
-    first = int(jnp.argmax(rings))
-    return modes.frequency[first], jnp.maximum(modes.damping_ratio[first], 0.0)
+    return frequency, damping_ratio
+
+
+@one_off
+def _ringing(modes: Modes) -> tuple[Bool[Array, ""], Scalar, Scalar]:
+    """Whether a mode rings; frequency and damping ratio of the slowest that does."""
+    rings = (modes.damping_ratio < OSCILLATORY) & (modes.frequency > 0)
+    first = jnp.argmax(rings)
+    return rings.any(), modes.frequency[first], jnp.maximum(modes.damping_ratio[first], 0.0)
 
 
 class NoRinging(ValueError):
@@ -126,13 +134,19 @@ def classical_designs(
         frequency, damping_ratio = ringing_mode(arm, jnp.stack(move.stop), controller)
     except NoRinging:
         return {}
-    designs = {}
-    for name, make in CLASSICAL.items():
-        shaper = make(frequency, damping_ratio)
-        left = scalar(total_time) - shaper.duration()
-        if left >= 0.1 * scalar(total_time):
-            designs[name] = Design(controller, with_duration(move, left), shaper)
-    return designs
+    shapers = _shapers(tuple(CLASSICAL.values()), frequency, damping_ratio, scalar(total_time))
+    return {
+        name: Design(controller, with_duration(move, left), shaper)
+        for name, (shaper, left) in zip(CLASSICAL, shapers, strict=True)
+        if float(left) >= 0.1 * float(total_time)
+    }
+
+
+@one_off
+def _shapers(makers: tuple, frequency: Scalar, damping_ratio: Scalar, total: Scalar):
+    """Shapers of a mode, each with what it leaves of `total` [s] to the move."""
+    shapers = [make(frequency, damping_ratio) for make in makers]
+    return [(shaper, total - shaper.duration()) for shaper in shapers]
 
 
 def with_duration(move: Move, duration: ScalarLike) -> Move:
@@ -149,9 +163,10 @@ def unshaped_design(
     return Design(controller, move, unshaped())
 
 
-def stack(designs: list[Design]) -> Design:
-    """Designs as one batched design, their shapers padded to the same number of impulses."""
-    longest = max(design.shaper.delays.shape[0] for design in designs)
+@one_off
+def stack(designs: list[Design], impulses: int = 1) -> Design:
+    """Designs as one batched design, their shapers padded to the same number of impulses, `impulses` at least."""
+    longest = max(impulses, *(design.shaper.delays.shape[0] for design in designs))
     padded = [eqx.tree_at(lambda d: d.shaper, design, design.shaper.padded(longest)) for design in designs]
     return jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *padded)
 
@@ -167,6 +182,12 @@ def default_move(arm: Arm) -> Move:
     locked = locked_frequencies(arm, pose)
     duration = 1.1 / locked[0] if locked.shape[0] else scalar(1.0)
     gains = textbook_pd(arm, pose, 1.0, feedforward=True)
+    return Move((0.0,) * len(stop), stop, _slow_enough(arm, stop, gains, duration))
+
+
+@one_off
+def _slow_enough(arm: Arm, stop: tuple[float, ...], gains: PD, duration: Scalar) -> Scalar:
+    """`duration` [s], or longer where the rigid arm would need more than half of the voltage limit."""
     for i, joint in enumerate(arm.joints):
         if joint.motor is None or joint.motor.voltage_limit is None or arm.drive != "voltage":
             continue
@@ -176,4 +197,4 @@ def default_move(arm: Arm) -> Move:
         acceleration = gains.acceleration_feedforward[i] * 10 / 3**0.5 * stop[i]
         needed = (rate + jnp.sqrt(rate**2 + 4 * half * acceleration)) / (2 * half)
         duration = jnp.maximum(duration, needed)
-    return Move((0.0,) * len(stop), stop, duration)
+    return duration

@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float, PyTree
+from jaxtyping import PyTree
 
 from jaxflex import Scalar, kept, value_and_gradient
 
-Free = Float[Array, " free"]
-Starts = Float[Array, "starts free"]
+from .judge import Free, Judged, Objective, Starts, each, judge
+
 OPTIONS = {"autodiff_mode": "fwd"}
 
 
@@ -42,11 +42,11 @@ class Stepper(eqx.Module):
     compiled once for an objective and a minimiser, whatever the `args`.
     """
 
-    objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]
+    objective: Objective
     minimiser: optx.AbstractMinimiser
 
 
-def with_gradient(objective: Callable[[Free, PyTree], tuple[Scalar, PyTree]]):
+def with_gradient(objective: Objective):
     """`objective`, its derivative computed together with it, in the mode that suits their number.
 
     What the objective returns beside its cost has no derivative.
@@ -75,11 +75,11 @@ def _constant(leaf):
     return np.zeros(leaf.shape, jax.dtypes.float0) if exact else jnp.zeros_like(leaf)
 
 
-def known(cost: Scalar, gradient: Free, aux: PyTree):
+def known(cost: Scalar, aux: PyTree, gradient: Free):
     """A function for a minimiser that asks for one point only, of which cost and gradient are known already.
 
-    A minimiser differentiates its function itself; a simulation is then traced through layers
-    of transformations that it has no need of, which took as long again.
+    A minimiser differentiates its function itself, which for a simulation would be traced
+    through layers of transformations, and run on one core.
     """
 
     @jax.custom_jvp
@@ -98,15 +98,8 @@ def _start(stepper: Stepper, free: Free, args: PyTree):
     return stepper.minimiser.init(stepper.objective, free, args, OPTIONS, cost, aux, frozenset())
 
 
-def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
+def _step(minimiser: optx.AbstractMinimiser, fn: Callable, free: Free, state: PyTree, args: PyTree):
     """One step: the point it judged, with its cost and aux, and where it goes on from."""
-    minimiser = stepper.minimiser
-    if hasattr(state, "y_eval"):  # quasi-Newton: it judges this point and no other
-        both = value_and_gradient(lambda x: stepper.objective(x, args), has_aux=True)
-        (cost, aux), gradient = both(state.y_eval)
-        fn = known(cost, gradient, aux)
-    else:  # optax: a line search may go further
-        fn = with_gradient(stepper.objective)
     after, new, last_aux = minimiser.step(fn, free, args, OPTIONS, state, frozenset())
     done, result = minimiser.terminate(fn, after, args, OPTIONS, new, frozenset())
     if hasattr(new, "f_info"):  # quasi-Newton: it returns the last point accepted
@@ -123,20 +116,25 @@ def _step(stepper: Stepper, free: Free, state: PyTree, args: PyTree):
 
 @kept
 def _start_all(stepper: Stepper, free: Starts, args: PyTree, own: PyTree):
-    return _each(lambda x, o: _start(stepper, x, (args, o)), free, own)
+    return each(lambda x, o: _start(stepper, x, (args, o)), free, own)
 
 
 @kept
+def _go_on_all(minimiser: optx.AbstractMinimiser, free: Starts, state: PyTree, found: Judged):
+    return each(lambda x, s, f: _step(minimiser, known(*f), x, s, None), free, state, found)
+
+
+@kept
+def _search_all(stepper: Stepper, free: Starts, state: PyTree, args: PyTree, own: PyTree):
+    fn = with_gradient(stepper.objective)
+    return each(lambda x, s, o: _step(stepper.minimiser, fn, x, s, (args, o)), free, state, own)
+
+
 def _step_all(stepper: Stepper, free: Starts, state: PyTree, args: PyTree, own: PyTree):
-    return _each(lambda x, s, o: _step(stepper, x, s, (args, o)), free, state, own)
-
-
-def _each(function: Callable, free: Starts, *rest: PyTree) -> PyTree:
-    """`function` of every row; of a single one without the layer of `vmap`, which takes long to trace."""
-    if free.shape[0] > 1:
-        return eqx.filter_vmap(function)(free, *rest)
-    row = jax.tree_util.tree_map(lambda x: x[0] if eqx.is_array(x) else x, (free, *rest))
-    return jax.tree_util.tree_map(lambda x: x[None] if eqx.is_array(x) else x, function(*row))
+    if not hasattr(state, "y_eval"):  # optax: a line search may ask for several points
+        return _search_all(stepper, free, state, args, own)
+    # quasi-Newton: it judges this point and no other
+    return _go_on_all(stepper.minimiser, free, state, judge(stepper.objective, state.y_eval, args, own))
 
 
 def minimise(

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxflex import Arm, Scalar, scalar
+from jaxflex import Arm, Scalar, one_off, scalar
 
 from .assess import with_payloads
 from .bijections import AbstractBijection, Delays, Interval, Simplex
@@ -84,6 +84,7 @@ class Problem(AbstractProblem):
         return self.task().outcome(self.design(values))
 
 
+@one_off
 def standard_start(problem: Problem) -> dict[str, Array]:
     """Gains in the middle of their range, and a shaper of equal gaps with binomial amplitudes."""
     n = problem.impulses

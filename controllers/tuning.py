@@ -18,10 +18,11 @@ import optimistix as optx
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, PyTree
 
-from jaxflex import Scalar
+from jaxflex import Scalar, one_off
 
 from .bijections import AbstractBijection
-from .minimise import Free, Minimum, Starts, Stepper, minimise
+from .judge import Free, Starts
+from .minimise import Minimum, Stepper, minimise
 from .task import Outcome
 
 KEPT = 1e-2  # relative excess up to which a constraint counts as kept
@@ -148,7 +149,7 @@ def tune(
 
     **Raises** `RuntimeError` if no start can be simulated.
     """
-    points = scattered(problem.free(first), starts, seed)
+    points = scattered(_free(problem, first), starts, seed)
     stepper = Stepper(lagrangian, minimiser or optx.BFGS(rtol=1e-4, atol=1e-4))
     args = (problem, first)
     count = 1  # with one round multipliers stay zero, and one stands for all
@@ -195,6 +196,8 @@ def tune(
                 cost, row, _ = m.aux
                 excess = float(np.max(row, initial=0.0))
                 found.append((excess > KEPT, excess if excess > KEPT else 0.0, float(cost), m))
+            if turn + 1 == rounds:
+                break
             rows = np.stack([m.aux[1] for m in ended])
             own, before = _updated(own, rows, before)
             free = jnp.stack([m.free for m in ended])  # noqa: PLW2901
@@ -203,7 +206,17 @@ def tune(
     best = min(minima, key=lambda m: m.cost) if rounds == 1 else min(found, key=lambda f: f[:3])[3]
     cost, row, measures = best.aux
     excess = float(np.max(row, initial=0.0))
-    return Tuned(problem.values(best.free, first), float(cost), excess, measures, minima, evaluations)
+    return Tuned(_values(problem, best.free, first), float(cost), excess, measures, minima, evaluations)
+
+
+@one_off
+def _free(problem: AbstractProblem, values: PyTree) -> Free:
+    return problem.free(values)
+
+
+@one_off
+def _values(problem: AbstractProblem, free: Free, like: PyTree) -> PyTree:
+    return problem.values(free, like)
 
 
 def _updated(own: tuple, rows: np.ndarray, before: np.ndarray) -> tuple[tuple, np.ndarray]:

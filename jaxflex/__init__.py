@@ -107,6 +107,7 @@ from .session import set_up as set_up
 # Simulation
 from .simulation.derivatives import adjoint_for as adjoint_for
 from .simulation.derivatives import value_and_gradient as value_and_gradient
+from .simulation.derivatives import value_and_slopes as value_and_slopes
 from .simulation.exact import Exact as Exact
 from .simulation.methods import AbstractMethod as AbstractMethod
 from .simulation.methods import Adaptive as Adaptive

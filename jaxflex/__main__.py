@@ -1,16 +1,12 @@
 """The `jaxflex` command."""
 
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Any, Optional
 
 import typer
 
-from .cli.diagnose import diagnose as diagnose_command
-from .cli.modes import modes as modes_command
 from .cli.runtime import command
-from .cli.shaper import shaper as shaper_command
-from .cli.simulate import simulate as simulate_command
-from .cli.tune import tune as tune_command
 
 app = typer.Typer(
     help="Flexible-link robot arms driven by DC motors: model, simulate, tune, diagnose.",
@@ -38,7 +34,7 @@ def tune(
     output: Output = None,
 ) -> None:
     """Tune PD gains and an input shaper by gradient so that the tip stops ringing for every payload."""
-    command(tune_command)(arm, payloads, move, duration, steps, seed, json, output)
+    _run("tune", arm, payloads, move, duration, steps, seed, json, output)
 
 
 @app.command()
@@ -55,7 +51,7 @@ def simulate(
     output: Output = None,
 ) -> None:
     """Simulate one run of an arm, or of the design that tune wrote; writes CSV and figure."""
-    command(simulate_command)(arm, payload, signal, duration, dt, json, output)
+    _run("simulate", arm, payload, signal, duration, dt, json, output)
 
 
 @app.command()
@@ -67,7 +63,7 @@ def modes(
     output: Output = None,
 ) -> None:
     """Natural frequencies with joints free, locked and controlled, against payload."""
-    command(modes_command)(arm, payloads, pose, json, output)
+    _run("modes", arm, payloads, pose, json, output)
 
 
 @app.command()
@@ -80,7 +76,7 @@ def diagnose(
     output: Output = None,
 ) -> None:
     """Find where the model and measured runs disagree, name the missing effect, and add it."""
-    command(diagnose_command, fuse=True)(arm, runs, json, output)
+    _run("diagnose", arm, runs, json, output, fuse=True)
 
 
 @app.command()
@@ -105,7 +101,13 @@ def shaper(
     output: Output = None,
 ) -> None:
     """Measure or compute what rings, and recommend an input shaper, with the reason."""
-    command(shaper_command)(files or [], payloads, driven_by, tolerance, json, output)
+    _run("shaper", files or [], payloads, driven_by, tolerance, json, output)
+
+
+def _run(name: str, *given: Any, fuse: bool = False) -> None:
+    """The command `name`, imported by itself: the others need what takes long to import."""
+    module = import_module(f"jaxflex.cli.{name}")
+    command(getattr(module, name), fuse=fuse)(*given)
 
 
 def main() -> None:

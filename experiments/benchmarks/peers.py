@@ -1,14 +1,17 @@
-"""The sweep in other programs: numba and SciPy with the library's equations, MuJoCo and Exudyn with their own.
+"""The sweep in other programs: numba and SciPy with the library's equations, MuJoCo, Exudyn and SoRoMoX with their own.
 
 Each returns rows of the work-precision diagram. MuJoCo models each link as a chain of 20
-segments, Exudyn by eight geometrically exact beams: their arm is not quite the same one, so their
-error is against their own converged result. A few arms are run and the seconds scaled to all.
+segments, Exudyn by eight geometrically exact beams, SoRoMoX (`soromox_model`) by a rod of variable
+curvature: their arm is not quite the same one, so their error is against their own converged
+result. A few arms are run and the seconds scaled to all.
 """
 
 import importlib.util
 from collections.abc import Callable
 from typing import Any
 
+import diffrax
+import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -23,6 +26,7 @@ from .timing import best_of
 from .work_precision import row, tips
 
 SEGMENTS, BEAMS = 20, 8
+CURVATURES = 2  # polynomials of a link's curvature in SoRoMoX: as many coordinates as the library has
 FEW = 4  # arms run by programs that take seconds for each
 
 NUMBA = """
@@ -273,6 +277,85 @@ def exudyn_rows(sweep: Sweep, few: int) -> list[dict]:
     return rows
 
 
+def soromox_model(arm: jf.Arm):
+    """The arm in SoRoMoX: geometrically exact rods whose curvature is a polynomial, on revolute joints.
+
+    Hubs and payload are rigid stubs of a millimetre; a hub on the first axis needs some mass, which does not move.
+    """
+    from soromox.systems.components import JointSpec, LinkSpec  # noqa: PLC0415
+    from soromox.systems.gvs import GVS, GVSSegment, StrainBasisSpec  # noqa: PLC0415
+
+    straight, stub, thin = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 1e-3, 1e-3
+    turning, fixed = JointSpec("revolute", "z"), JointSpec("fixed")
+
+    def body(joint, mass, inertia):
+        across = np.sqrt(12 * max(inertia / mass - stub**2 / 12, 1e-8))
+        piece = LinkSpec.rectangular(
+            length=stub, height=across, width=mass / stub / across, density=1.0, reference_strain=straight,
+            young_modulus=1.0, poisson_ratio=0.0,
+        )  # fmt: skip
+        return GVSSegment(piece, joint, StrainBasisSpec("legendre", [0] * 6, 0), 5)
+
+    segments = []
+    for joint, link in zip(arm.joints, arm.links, strict=True):
+        segments.append(body(turning, float(joint.hub_mass) or 0.1, float(joint.hub_inertia)))
+        rod = LinkSpec.rectangular(
+            length=float(link.length), height=thin, width=thin, density=float(link.mass_per_length) / thin**2,
+            reference_strain=straight, young_modulus=float(link.flexural_rigidity) * 12 / thin**4,
+            poisson_ratio=0.0,
+        )  # fmt: skip
+        segments.append(GVSSegment(rod, fixed, StrainBasisSpec("legendre", ("kappa_z",), CURVATURES - 1), 5))
+    segments.append(body(fixed, float(arm.payload.mass), 0.0))
+    return GVS.from_segments(segments, gravity=jnp.zeros(3))
+
+
+def soromox_rows(sweep: Sweep, few: int) -> list[dict]:
+    """A batch of arms by `vmap` under `jit`, with diffrax's steps, fixed and adaptive."""
+    from soromox.systems.system_state import SystemState  # noqa: PLC0415
+
+    arms = np.linspace(0, len(sweep.payloads) - 1, few).astype(int)
+    payloads, middle = jnp.asarray(sweep.payloads[arms]), 0.05
+    model = soromox_model(sweep.arm(middle))
+    density, size = model.params.link.density, model.num_coordinates
+    joints = (0, 1 + CURVATURES)  # the joint angles among the coordinates
+    stiffness, damping, stop = (np.zeros(size) for _ in range(3))
+    for place, p, d, angle in zip(joints, GAINS.stiffness, GAINS.damping, STOP, strict=True):
+        stiffness[place], damping[place], stop[place] = float(p), float(d), angle
+
+    def command(state):
+        x = jnp.clip(state.t / MOVE_TIME, 0, 1)
+        share, rate = x**3 * (10 + x * (6 * x - 15)), 30 * x**2 * (1 - x) ** 2 / MOVE_TIME
+        q, v = state.y[:size], state.y[size:]
+        return stiffness * (stop * share - q) + damping * (stop * rate - v), None
+
+    def last(payload, **steps):
+        robot = model.update_link_params(density=density.at[-1].multiply(payload / middle))
+        start = SystemState(t=jnp.zeros(()), y=jnp.zeros(2 * size))
+        found = robot.rollout_closed_loop_to(
+            start, command, t1=DURATION, save_ts=jnp.array([DURATION]), max_steps=100_000, **steps
+        )
+        return robot.forward_kinematics_tips(found.y[-1, :size])[-1, 1:3, 3]
+
+    def ends(**steps):
+        program = jax.jit(jax.vmap(lambda payload: last(payload, **steps)))
+        return lambda: np.asarray(program(payloads))
+
+    def tolerance(tol):
+        return diffrax.PIDController(rtol=tol, atol=1e-2 * tol)
+
+    tsit = diffrax.Tsit5()  # Dopri8 takes half as long again
+    settings = {
+        "Tsit5, 0.001 s": {"solver": tsit, "solver_dt": 1e-3},
+        "Tsit5, 0.001": {"solver": tsit, "solver_dt": 1e-3, "stepsize_controller": tolerance(1e-3)},
+        "Tsit5, 0.0001": {"solver": tsit, "solver_dt": 1e-3, "stepsize_controller": tolerance(1e-4)},
+    }
+    rows, scale, exact = [], len(sweep.payloads) / few, ends(solver=tsit, solver_dt=5e-4)()
+    for setting, steps in settings.items():
+        run = ends(**steps)
+        rows.append(row("SoRoMoX", setting, run(), exact, best_of(run, 2) * scale))
+    return rows
+
+
 def peer_rows(sweep: Sweep, e: Equations, exact: np.ndarray, reduced: bool) -> tuple[list[dict], list[str]]:
     """Rows of every peer that is installed, and a word on each that is not."""
     few = 1 if reduced else FEW
@@ -280,6 +363,7 @@ def peer_rows(sweep: Sweep, e: Equations, exact: np.ndarray, reduced: bool) -> t
         "numba": lambda: numba_rows(sweep, e, exact, (1e-3,)) + scipy_rows(sweep, e, exact, few),
         "mujoco": lambda: mujoco_rows(sweep, few),
         "exudyn": lambda: exudyn_rows(sweep, few),
+        "soromox": lambda: soromox_rows(sweep, few),
     }
     rows, missing = [], []
     for name, measure in peers.items():

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jax.core import Tracer
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Array, Complex, Float, Int
 
 from ..arm.arm import Arm, AssembledArm
 from ..control import AbstractController, AbstractReference, Setpoint
@@ -163,9 +163,15 @@ class Modes(NamedTuple):
 
 def closed_loop_modes(linear: LinearModel) -> Modes:
     """Modes of `x' = A x`, from its eigenvalues; call it outside of `jit`, on one model."""
-    poles = jnp.linalg.eigvals(linear.A)
-    poles = poles[poles.imag >= 0]
-    poles = poles[jnp.argsort(jnp.abs(poles))]
+    modes, count = _modes(linear.A)
+    return Modes(*(column[: int(count)] for column in modes))
+
+
+@one_off
+def _modes(a: Float[Array, "states states"]) -> tuple[Modes, Int[Array, ""]]:
+    """All poles as modes, those of negative imaginary part last, and how many come before these."""
+    poles = jnp.linalg.eigvals(a)
+    poles = poles[jnp.lexsort((jnp.abs(poles), poles.imag < 0))]
     size = jnp.abs(poles)
     ratio = -poles.real / jnp.where(size > 0, size, 1.0)
-    return Modes(size / (2 * jnp.pi), ratio, poles)
+    return Modes(size / (2 * jnp.pi), ratio, poles), jnp.sum(poles.imag >= 0)

@@ -3,10 +3,12 @@
 import dataclasses
 from itertools import pairwise
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from controllers import (
+    CLASSICAL,
     Assessment,
     Design,
     Move,
@@ -25,6 +27,7 @@ from .tables import Table, number
 
 UNTUNED, TUNED = "PD, untuned", "tuned"
 STRETCHED = "PD, untuned, equal time"
+HALF = 2 + len(CLASSICAL)  # designs that owe nothing to a tuning; as many do
 
 
 @dataclasses.dataclass
@@ -46,31 +49,69 @@ class Comparison:
         return float(np.max(self.of("residual_vibration", name)[self.held_out]))
 
 
-def compare(
-    arm: Arm, masses: list[float], chosen: list[float], path: Move, total: float, tuned: Design
-) -> Comparison:
-    """All designs on the arm as given, over the payloads asked for and those halfway between them."""
-    pose = jnp.stack(path.stop)
-    untuned = textbook_pd(arm, pose)
-    designs = {UNTUNED: unshaped_design(untuned, path), STRETCHED: unshaped_design(untuned, path, total)}
-    for name, design in classical_designs(arm, untuned, path, total).items():
-        designs[name] = design
-    designs["tuned PD, equal time"] = unshaped_design(tuned.controller, path, total)
-    for name, design in classical_designs(arm, tuned.controller, path, total).items():
-        designs[f"{name}, tuned PD"] = design
-    designs[TUNED] = tuned
-    between = [(a + b) / 2 for a, b in pairwise(masses)]
-    payloads = np.array(sorted(masses + between))
-    held_out = ~np.isin(payloads, chosen)
-    if not held_out.any():
-        held_out[:] = True  # a single payload: it is all there is to judge by
-    watch = 2.0 / float(locked_frequencies(arm, pose)[0])
-    times = jnp.linspace(0.0, total + watch, 1201)
-    assessment, trajectory = assess(
-        stack(list(designs.values())), with_payloads(arm, jnp.asarray(payloads)), times
+@dataclasses.dataclass
+class Contest:
+    """What the designs are compared in: a move on the arm as given, stretched to `total` [s], over payloads.
+
+    These are `masses` [kg] and those halfway between them; the search saw those `chosen`. Shapers are
+    padded to `impulses` and designs to `HALF`, so that one program serves before and after a tuning.
+    """
+
+    arm: Arm
+    masses: list[float]
+    chosen: list[float]
+    path: Move
+    total: float
+    impulses: int
+
+    def untuned(self) -> dict[str, Design]:
+        """The designs that owe nothing to the tuning."""
+        gains = textbook_pd(self.arm, jnp.stack(self.path.stop))
+        designs = {
+            UNTUNED: unshaped_design(gains, self.path),
+            STRETCHED: unshaped_design(gains, self.path, self.total),
+        }
+        return designs | classical_designs(self.arm, gains, self.path, self.total)
+
+    def tuned(self, design: Design) -> dict[str, Design]:
+        """The tuned design, and others with its gains."""
+        gains = design.controller
+        designs = {"tuned PD, equal time": unshaped_design(gains, self.path, self.total)}
+        for name, rival in classical_designs(self.arm, gains, self.path, self.total).items():
+            designs[f"{name}, tuned PD"] = rival
+        return designs | {TUNED: design}
+
+    def payloads(self) -> np.ndarray:
+        """All payloads [kg], rising."""
+        between = [(a + b) / 2 for a, b in pairwise(self.masses)]
+        return np.array(sorted(self.masses + between))
+
+    def held(self, designs: dict[str, Design]) -> Comparison:
+        """These designs on every payload."""
+        payloads = self.payloads()
+        held_out = ~np.isin(payloads, self.chosen)
+        if not held_out.any():
+            held_out[:] = True  # a single payload: it is all there is to judge by
+        watch = 2.0 / float(locked_frequencies(self.arm, jnp.stack(self.path.stop))[0])
+        times = jnp.linspace(0.0, self.total + watch, 1201)
+        given = list(designs.values())
+        full = given + [given[-1]] * (HALF - len(given))
+        batch = stack(full, self.impulses), with_payloads(self.arm, jnp.asarray(payloads))
+        found = jax.tree_util.tree_map(
+            lambda x: jnp.asarray(np.asarray(x)[: len(given)]), assess(*batch, times)
+        )
+        return Comparison(designs, payloads, held_out, *found)
+
+
+def together(one: Comparison, other: Comparison) -> Comparison:
+    """The designs of both; raises `SimulationError` where one could not be simulated."""
+    assessment, trajectory = jax.tree_util.tree_map(
+        lambda *rows: jnp.asarray(np.concatenate(rows)),  # by numpy, which compiles nothing
+        (one.assessment, one.trajectory),
+        (other.assessment, other.trajectory),
     )
     trajectory.check()
-    return Comparison(designs, payloads, held_out, assessment, trajectory)
+    return Comparison(one.designs | other.designs, one.payloads, one.held_out, assessment, trajectory)
 
 
 def comparison_tables(comparison: Comparison) -> list[Table]:

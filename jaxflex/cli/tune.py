@@ -26,7 +26,16 @@ from ..analysis.frequencies import locked_frequencies
 from ..arm.arm import Arm
 from ..arm.library import ahmad_arm
 from ..files.arm_file import read_arm_file
-from .comparison import STRETCHED, TUNED, UNTUNED, Comparison, best_classical, compare, comparison_tables
+from .comparison import (
+    STRETCHED,
+    TUNED,
+    UNTUNED,
+    Comparison,
+    Contest,
+    best_classical,
+    comparison_tables,
+    together,
+)
 from .design_file import save_design
 from .report import save_pictures
 from .runtime import UsageError, console, make_folder, parse_numbers, parse_payloads
@@ -68,14 +77,13 @@ def tune(
         f"{total:.3g} s with the shaper; lowest locked frequency "
         f"{float(locked_frequencies(middle, jnp.stack(path.stop))[0]):.3g} Hz"
     )
+    contest = Contest(middle, masses, chosen, path, total, problem.impulses)
     with ThreadPoolExecutor(1) as pool:
-        # while one core searches, the other compiles the comparison, on a design of the same shape
-        first = problem.design(standard_start(problem))
-        warm = pool.submit(compare, middle, masses, chosen, path, total, first)
+        # what owes nothing to the tuning is compared meanwhile, by the program that the rest will need
+        untuned = pool.submit(lambda: contest.held(contest.untuned()))
         tuned = _search(problem, steps, seed)
-        warm.exception()  # a first design that cannot be simulated is no reason to stop
     design = problem.design(tuned.values)
-    comparison = compare(middle, masses, chosen, path, total, design)
+    comparison = together(untuned.result(), contest.held(contest.tuned(design)))
     seconds = time.monotonic() - began
     for table in comparison_tables(comparison):
         console.print(table.rich())
@@ -119,7 +127,7 @@ def search_arm(arm: Arm) -> Arm:
 def make_problem(arm: Arm, masses: list[float], path: Move) -> Problem:
     """The tuning problem of an arm: its shaper takes 0.45 and the watch 2 periods of the lowest mode."""
     pose = jnp.stack(path.stop)
-    period = 1 / locked_frequencies(arm, pose)[0]
+    period = 1 / float(locked_frequencies(arm, pose)[0])
     coarse = search_arm(arm)
     start = textbook_pd(coarse, pose, feedforward=True)
     return Problem(coarse, jnp.asarray(masses), path, start, 0.45 * period, watch=2 * period)

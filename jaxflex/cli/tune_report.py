@@ -5,12 +5,14 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from matplotlib.figure import Figure
 
 from controllers import GAINS, Design, Tuned
 
 from ..analysis.measures import spectrum
 from ..arm.arm import Arm
+from ..one_off import one_off
 from ..plotting import AFTER, plot_bending, plot_history, plot_residual, plot_spectra
 from .comparison import STRETCHED, TUNED, UNTUNED, Comparison, best_classical, comparison_tables
 from .report import Picture, bullets, card, grid, paragraph, picture, png, section, tables, write_report
@@ -81,6 +83,11 @@ def design_table(design: Design, arm: Arm) -> Table:
     return table
 
 
+@one_off
+def _spectra(times: Float[Array, " times"], signals: Float[Array, "payloads times"]) -> tuple[Array, Array]:
+    return jax.vmap(lambda signal: spectrum(times, signal))(signals)
+
+
 def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str, Picture]:
     """The pictures, each with its caption and what to see in it."""
     names, path = list(comparison.designs), comparison.trajectory
@@ -91,10 +98,8 @@ def draw(comparison: Comparison, tuned: Tuned, masses: list[float]) -> dict[str,
     on = ~comparison.held_out if (~comparison.held_out).any() else comparison.held_out
     ends = [float(comparison.designs[name].move_time()) for name in (UNTUNED, TUNED)]
     late = times >= max(ends)
-    shake = path[f"tip_acceleration_{links}"][:, :, late]
-    ours, theirs = (
-        jax.vmap(lambda signal: spectrum(jnp.asarray(times[late]), signal))(shake[k]) for k in (last, first)
-    )
+    shake = np.asarray(path[f"tip_acceleration_{links}"])[:, :, late]
+    ours, theirs = (_spectra(jnp.asarray(times[late]), jnp.asarray(shake[k])) for k in (last, first))
     residual = {name: comparison.of("residual_vibration", name) for name in names}
     lowest = 3.0 / (times[-1] - ends[1])
     payloads = comparison.payloads[on].tolist()

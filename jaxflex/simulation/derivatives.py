@@ -42,13 +42,31 @@ def value_and_gradient(function: Callable[[Float[Array, " n"]], Any], has_aux: b
     def call(x: Float[Array, " n"]) -> tuple[Any, Float[Array, " n"]]:
         if x.shape[0] > FEW:
             return jax.value_and_grad(function, has_aux=has_aux)(x)
+        return value_and_slopes(function, has_aux)(x, jnp.eye(x.shape[0], dtype=x.dtype))
 
+    return call
+
+
+def value_and_slopes(function: Callable[[Float[Array, " n"]], Any], has_aux: bool = False):
+    """`(x, directions) -> (function(x), slopes)`: how the value changes along each of some directions, forwards.
+
+    All directions of a call go side by side; calls for some of them each may go on
+    different cores. `has_aux` as for `value_and_gradient`.
+    """
+
+    def call(
+        x: Float[Array, " n"], directions: Float[Array, "directions n"]
+    ) -> tuple[Any, Float[Array, " directions"]]:
         def twice(x):
             found = function(x)
             return (found[0] if has_aux else found), found
 
-        gradient, value = jax.jacfwd(twice, has_aux=True)(x)
-        return value, gradient
+        def along(direction):
+            _, slope, found = jax.jvp(twice, (x,), (direction,), has_aux=True)
+            return slope, found
+
+        slopes, found = jax.vmap(along, out_axes=(0, None))(directions)
+        return found, slopes
 
     return call
 

@@ -32,8 +32,10 @@ from controllers import (
     unshaped_design,
     varied,
 )
+from controllers.judge import TOGETHER, groups, judge
 from controllers.minimise import Stepper, minimise
 from controllers.pareto import at_pace
+from controllers.tuning import lagrangian
 from jaxflex import margins
 
 
@@ -310,3 +312,45 @@ def test_minimisers_are_told_the_cost_of_the_point_they_ask_for(minimiser):
     (found,) = minimise(Stepper(valley, minimiser), jnp.asarray([[-0.5, 0.6]]), 400)
     assert found.cost < 1e-5
     assert found.aux["count"] == 2 and found.aux["cost"] == pytest.approx(found.cost)
+
+
+@pytest.mark.parametrize("count", [1, TOGETHER, TOGETHER + 1, 13, 3 * TOGETHER])
+def test_groups_hold_every_direction_once(count):
+    found = groups(count, np.dtype(float))
+    assert found.shape[1] <= TOGETHER
+    rows = found.reshape(-1, count)
+    np.testing.assert_array_equal(rows[:count], np.eye(count))
+    assert not rows[count:].any() and len(rows) - count < len(found)
+
+
+@pytest.mark.parametrize("starts", [1, 3])
+@pytest.mark.parametrize("count", [1, 8, 13, 24, 30])  # 30: backwards
+def test_gradients_in_groups_are_those_of_the_cost(count, starts):
+    def waves(x, args):
+        rate, phase = args
+        cost = jnp.sum(jnp.sin(rate * x + phase)) * jnp.prod(1 + 0.1 * x)
+        return cost, {"last": x[-1], "calm": jnp.sum(x < 0)}
+
+    points = jax.random.normal(jax.random.key(count), (starts, count))
+    rate, phases = jnp.asarray(1.5), jnp.arange(float(starts))
+    found = judge(waves, points, rate, phases)
+    for i, (x, phase) in enumerate(zip(points, phases, strict=True)):
+        cost, aux = waves(x, (rate, phase))
+        np.testing.assert_allclose(found.cost[i], cost, rtol=1e-12)
+        np.testing.assert_allclose(
+            found.gradient[i], jax.grad(waves, has_aux=True)(x, (rate, phase))[0], rtol=1e-9
+        )
+        assert found.aux["last"][i] == aux["last"] and found.aux["calm"][i] == aux["calm"]
+
+
+def test_gradient_of_a_tuning_is_the_same_in_groups_and_in_one(problem):
+    first = standard_start(problem)
+    free = problem.free(first)
+    assert TOGETHER < free.shape[0] < 2 * TOGETHER and free.shape[0] % 2 == 0
+    args, own = (problem, first), (jnp.zeros((1, 1)), jnp.full(1, 600.0))
+    found = judge(lagrangian, free[None], args, own)
+    alone = jf.value_and_gradient(lambda x: lagrangian(x, (args, (own[0][0], own[1][0]))), has_aux=True)
+    (cost, (_, row, _)), gradient = jax.jit(alone)(free)
+    np.testing.assert_allclose(found.cost, cost[None], rtol=1e-9)
+    np.testing.assert_allclose(found.aux[1], row[None], rtol=1e-8)
+    np.testing.assert_allclose(found.gradient, gradient[None], rtol=1e-6, atol=1e-8)

@@ -30,3 +30,11 @@ def test_gradient_in_the_mode_chosen_by_count(count):
 
 def test_mode_changes_with_the_count():
     assert type(jf.adjoint_for(10)) is not type(jf.adjoint_for(200))
+
+
+def test_slopes_along_some_directions_are_parts_of_the_gradient():
+    values = 0.1 * jnp.cos(jnp.arange(4.0))
+    (value, gradient), along = jf.value_and_gradient(push)(values), jnp.eye(4)[1:3]
+    found, slopes = jf.value_and_slopes(push)(values, along)
+    np.testing.assert_allclose(found, value, rtol=1e-12)
+    np.testing.assert_allclose(slopes, gradient[1:3], rtol=1e-9)
