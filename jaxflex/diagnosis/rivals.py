@@ -4,10 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from .hypothesis import CLOSE, HORIZONS, STRONG, Outcome, Search, without
+from .hypothesis import CLOSE, STRONG, Outcome, Search, without
 from .loose_joint import is_of_loose_joint
 
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
+HARDLY_MORE = 0.5  # of what is left in either case: a rival that leaves this much more is no worse
 
 
 def prune(search: Search, outcome: Outcome) -> None:
@@ -47,8 +48,10 @@ def weigh(search: Search, outcome: Outcome) -> None:
             if rival.horizon != final.horizon or not search.sensible(rival):
                 continue
             lost = final.gain(rival)
+            worth, left = max(share, outcome.gains[place]), final.fit.cost - final.fit.count
+            alike = final.strength(rival) < 1.0 or lost < HARDLY_MORE * left
+            same = lost < TIE * worth and alike
             # another form of what is there would explain a little more, whatever is there
-            same = lost < TIE * share and final.strength(rival, dict.fromkeys(HORIZONS, share)) < 1.0
             better = lost < 0 and rival.strength(final, outcome.explained_over()) > STRONG
             simpler = same and item.candidate.count < effect.count
             if (better or simpler) and not is_of_loose_joint(search.parameters, effect):
