@@ -1,0 +1,35 @@
+"""What effects account for, over short horizons and long ones."""
+
+import numpy as np
+
+from jaxflex.diagnosis.calibrate import Fit, Freedom
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
+from jaxflex.diagnosis.normal import Normal
+
+COUNT = 1000
+
+
+def fitted(*costs):
+    """A hypothesis with these costs over the first horizons."""
+    found = Fit(
+        np.zeros(0), Freedom.full([]), costs[-1], 0.0, Normal(np.eye(0), np.zeros(0), costs[-1], 0.0, COUNT)
+    )
+    return Hypothesis((), found, HORIZONS[len(costs) - 1], dict(zip(HORIZONS, costs, strict=False)))
+
+
+def outcome(final, nominal_level, level):
+    found = Outcome(fitted(5e3), [])
+    found.final, found.nominal_level, found.level = final, nominal_level, level
+    return found
+
+
+def test_what_is_explained_grows_with_the_horizon():
+    short, middle, long = outcome(fitted(1e3, 1.1e3, 1.2e3), 101.0, 1.2).explained_over().values()
+    assert short == 4e3
+    assert np.isclose(long, 99.8 * COUNT)
+    assert np.isclose(middle, 0.3 * long)
+
+
+def test_a_motion_that_was_lost_over_a_second_counts_as_over_the_shortest_horizon():
+    explained = outcome(fitted(1e3), np.inf, 1.2).explained_over()
+    assert set(explained.values()) == {4e3}
