@@ -39,6 +39,7 @@ class Chains:
     by_column: np.ndarray  # (chains, length, states, columns)
     table: np.ndarray  # (chains, readings, states + columns), whitened
     gram: np.ndarray  # (chains, states + columns, states + columns)
+    bounded: bool  # False where slopes left all bounds
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def _joined(linear: Linearised, pieces: np.ndarray, colour: Sequence[np.ndarray]
         by_start, by_column = through @ by_start, through @ by_column + linear.end_by_column[at]
     table = _whitened(np.concatenate(rows, 1), colour).reshape(count, -1, states + columns)
     gram = table.transpose(0, 2, 1) @ table
-    return Chains(pieces, np.stack(starts, 1), np.stack(slopes, 1), table, gram)
+    return Chains(pieces, np.stack(starts, 1), np.stack(slopes, 1), table, gram, _bounded(table))
 
 
 def _whitened(rows: np.ndarray, colour: Sequence[np.ndarray]) -> np.ndarray:
@@ -119,7 +120,7 @@ def condense(
     with np.errstate(all="ignore"):  # a motion may be lost
         for chains in join(linear, horizon, colour):
             residual, offset = _along(linear, chains, colour)
-            if not _bounded(residual) or not _bounded(chains.table):
+            if not (chains.bounded and _bounded(residual)):
                 total.cost = np.inf
                 return total
             gram, right = chains.gram, (residual[:, None] @ chains.table)[:, 0]
