@@ -87,13 +87,13 @@ def _joined(linear: Linearised, pieces: np.ndarray, colour: Sequence[np.ndarray]
         )  # fmt: skip
         through = linear.end_by_start[at]
         by_start, by_column = through @ by_start, through @ by_column + linear.end_by_column[at]
-    table = _whitened(np.concatenate(rows, 1), colour).reshape(count, -1, states + columns)
+    table = whitened(np.concatenate(rows, 1), colour).reshape(count, -1, states + columns)
     gram = table.transpose(0, 2, 1) @ table
     return Chains(pieces, np.stack(starts, 1), np.stack(slopes, 1), table, gram, _bounded(table))
 
 
-def _whitened(rows: np.ndarray, colour: Sequence[np.ndarray]) -> np.ndarray:
-    """`(chains, samples, channels, …)`, filtered along the samples."""
+def whitened(rows: np.ndarray, colour: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows `(chains, samples, channels, …)`, filtered along the samples in place."""
     for c, filter_ in enumerate(colour):
         if len(filter_) > 1:
             rows[:, :, c] = lfilter(filter_, [1.0], rows[:, :, c], axis=1)
@@ -147,7 +147,7 @@ def _along(linear: Linearised, chains: Chains, colour: Sequence[np.ndarray]) -> 
         offsets.append(offset)
         rows.append(linear.residual[at] - (linear.by_start[at] @ offset[:, None, :, None])[..., 0])
         offset = (linear.end_by_start[at] @ offset[..., None])[..., 0] + linear.gap[at]
-    residual = _whitened(np.concatenate(rows, 1), colour)
+    residual = whitened(np.concatenate(rows, 1), colour)
     return residual.reshape(len(residual), -1), np.stack(offsets, 1)
 
 

@@ -18,7 +18,7 @@ from ..sensors import unit
 from .calibrate import fit
 from .catalogue import Candidate
 from .departure import departures, is_bent
-from .foretell import AT_FLOOR, Foretold, foretell, noise
+from .foretell import AT_FLOOR, Foretold, foretell
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
 from .locate import LatentForce, regimes
 from .next_experiment import advice
@@ -71,7 +71,7 @@ def describe(study: Study, stated: Nominally, began: float) -> Diagnosis:
         verdict=verdict,
         effects=effects,
         alternatives=tuple(alternatives),
-        where=_where(search.problem, before.errors, stated.forces, outcome),
+        where=_where(before.misfits, stated.forces, outcome),
         gap=Gap(
             "root mean square error of predictions over 1 s from estimated starts",
             True, before.errors, after.errors, study.prepared.floor,
@@ -171,10 +171,8 @@ def _named(
     return NamedEffect(effect.effect, effect.location, found, worth, EFFECTS[effect.effect].looks_like)
 
 
-def _where(
-    problem: Problem, before: dict[str, float], forces: list[LatentForce], outcome: Outcome
-) -> tuple[Place, ...]:
-    excess = {c: max((before[c] / s) ** 2 - 1, 0.0) for c, s in noise(problem).items()}
+def _where(before: dict[str, float], forces: list[LatentForce], outcome: Outcome) -> tuple[Place, ...]:
+    excess = {channel: max(misfit - 1, 0.0) for channel, misfit in before.items()}
     total = sum(excess.values())
     if total <= 0:
         return ()

@@ -8,7 +8,7 @@ from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe, nominally
 from .find import HALFWAY, find
-from .foretell import AT_FLOOR, noise
+from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
 from .loose_joint import loose_joints
@@ -90,9 +90,8 @@ def _deflections(study: Study) -> list[str]:
 
 def _astray_in_deflection(study: Study) -> bool:
     """True if the channel farthest from what was foretold is a deflection."""
-    floor = noise(study.prepared.problem)
-    errors = study.foretold().errors
-    return max(errors, key=lambda name: errors[name] / floor[name]) in _deflections(study)
+    misfits = study.foretold().misfits
+    return max(misfits, key=lambda name: misfits[name]) in _deflections(study)
 
 
 def _leaves_much(study: Study) -> bool:

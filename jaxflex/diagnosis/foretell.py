@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .calibrate import Freedom, fit
+from .chains import whitened
 from .flanks import choose_flanks
 from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
 from .shooting import LOST_PIECE, Problem, Run
@@ -16,35 +17,36 @@ AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing i
 
 
 class Foretold(NamedTuple):
-    """Errors by channel, root mean square; every run with its readings as predicted; misfit a reading.
+    """What held-out runs were foretold as.
 
-    The `level` is in units of the noise, so 1 is the noise floor; `starts` are those that were fitted.
+    `errors` by channel, root mean square; `misfits` a reading by channel, whitened and in units of the
+    noise, so that 1 is the noise floor; every run with its readings as predicted; `starts` as fitted.
     """
 
     errors: dict[str, float]
+    misfits: dict[str, float]
     predictions: list[tuple[Run, np.ndarray]]
-    level: float
     starts: Starts
 
-
-def noise(problem: Problem) -> dict[str, float]:
-    """Standard deviation of each channel's noise."""
-    s = problem.setting
-    return {c: float(n) for c, n in zip(s.channels, s.noise, strict=True)}
+    @property
+    def level(self) -> float:
+        """Misfit a reading over all channels."""
+        return float(np.mean(list(self.misfits.values())))
 
 
 def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foretold:
     """Held-out runs as the hypothesis predicts them, the starts of their pieces alone fitted."""
+    setting = problem.setting
     # the phase of a disturbance is its own in every run
     free = [
-        problem.setting.parameters.position(*effect.key, name)
+        setting.parameters.position(*effect.key, name)
         for effect in hypothesis.effects
         if effect.effect == "periodic_disturbance"
         for name in effect.amplitudes
     ]
     held = Freedom.full(free)
     plays = [effect.index for effect in hypothesis.effects if effect.effect == "backlash"]
-    squares, predictions = [], []
+    squares, misfits, predictions = [], [], []
     for run in runs:
         vector = hypothesis.fit.vector
         for horizon in HORIZONS:
@@ -60,8 +62,12 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
         reading = np.where(lost, np.mean(run.reading, (0, 1)), reading)
         error = np.where(run.valid[..., None], run.reading - reading, 0.0)
         squares.append((error**2).sum((0, 1)) / run.valid.sum())
+        white = whitened(error.reshape(1, -1, error.shape[-1]).copy(), setting.colour) / setting.noise
+        misfits.append((white**2).sum((0, 1)) / run.valid.sum())
         predictions.append((run, reading))
-    rms = np.sqrt(np.mean(squares, 0))
-    errors = dict(zip(problem.setting.channels, map(float, rms), strict=True))
-    level = float(np.mean([(errors[c] / s) ** 2 for c, s in noise(problem).items()]))
-    return Foretold(errors, predictions, level, starts_of(runs))
+
+    def by_channel(values: np.ndarray) -> dict[str, float]:
+        return dict(zip(setting.channels, map(float, values), strict=True))
+
+    errors, levels = by_channel(np.sqrt(np.mean(squares, 0))), by_channel(np.mean(misfits, 0))
+    return Foretold(errors, levels, predictions, starts_of(runs))

@@ -101,6 +101,15 @@ def test_nothing_hidden_is_nothing_missing(hidden):
     assert found.verdict == "nothing_missing" and not found.effects
 
 
+def test_noise_with_colour_is_nothing_missing(tmp_path):
+    (case,) = make_cases("single_link", [()], [0.0], [0], noise="coloured")
+    write_case(case, tmp_path)
+    found = answer(tmp_path)
+    assert found.verdict == "nothing_missing"
+    # the noise of a tenth of a second's rest is known roughly
+    assert found.gap.after["tip_deflection_1"] < 1.3 * found.gap.noise_floor["tip_deflection_1"]
+
+
 def test_a_deflection_that_a_gauge_stands_for_is_followed_as_one():
     """What a gauge shows of the second mode no start, parameter or effect can imitate."""
     arm = jf.foldager_link(0.02, modes=2)
