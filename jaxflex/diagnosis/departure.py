@@ -15,7 +15,7 @@ from .parameters import Parameters
 SUSPECT = 0.99  # of arms as stated, the share whose parameters depart less: beyond it parts are tried
 BENT = 0.999  # the same, beyond which something is missing
 FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
-MOST_ERROR = 2.5  # times the usual departure: what such an error is excused for before parts have been tried
+MOST_ERROR = 1.8  # times the usual departure: what such an error is excused for before parts have been tried
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 
 
