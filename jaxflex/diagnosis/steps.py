@@ -23,7 +23,7 @@ from ..arm.arm import AssembledArm
 from .plant import Direction, Instruments, Interval, Moments, Pieces, Response, interval_slopes, lag
 
 MOMENTS = 128  # intervals that are made linear at once
-LANES = 10  # parameters whose slopes are taken side by side: one compiled program whatever their number
+LANES = 8  # parameters whose slopes are taken side by side: one compiled program whatever their number
 
 
 @dataclass(frozen=True)
