@@ -30,7 +30,10 @@ VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
 OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
-DELAY_ERROR = 0.05  # of a sample: a delayed command counts as its mean over each
+TIMING_ERRORS = {  # of a sample
+    "input_delay": 0.05,  # a delayed command counts as its mean over each
+    "sensor_lag": 0.3,  # a filter that works on samples lags by half of one more or less
+}
 
 
 class Nominally(NamedTuple):
@@ -144,7 +147,7 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
         else:
             part = parameters.effect[column - len(parameters.nominal)]
             own = OWN_ERRORS.get(part.effect, OWN_ERROR) * value
-            late = DELAY_ERROR * search.problem.setting.sample_time if part.effect == "input_delay" else 0.0
+            late = TIMING_ERRORS.get(part.effect, 0.0) * search.problem.setting.sample_time
             whole = float(np.sqrt(std**2 + own**2 + late**2))
             estimates[column] = Estimate(float(value), whole, _unit(part.unit, part.location))
     return estimates
