@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 import jaxflex as jf
 from controllers import Sampled
+from controllers.judge import judge
 
 from .problem import DURATION, GAINS, STOP, sweep
 from .timing import best_of, compiled
@@ -32,8 +33,16 @@ def cost(parameters: jax.Array, adjoint: diffrax.AbstractAdjoint) -> jax.Array:
     return jnp.mean(jax.vmap(one)(jnp.asarray(arms.payloads)))
 
 
+def objective(parameters: jax.Array, args: None):
+    """The cost as a tuning asks for it."""
+    return cost(parameters, diffrax.ForwardMode()), args
+
+
 def measure(counts: tuple[int, ...]) -> list[dict]:
-    """Seconds of the cost, and of its gradient in both modes as multiples of it."""
+    """Seconds of the cost, and of its gradient in both modes as multiples of it.
+
+    Few parameters in groups on all cores as well, as a tuning has them, by the clock.
+    """
     found = []
     forwards, backwards = diffrax.ForwardMode(), diffrax.RecursiveCheckpointAdjoint()
     for count in counts:
@@ -45,10 +54,17 @@ def measure(counts: tuple[int, ...]) -> list[dict]:
             "reverse": jax.grad(lambda p: cost(p, backwards)),
         }
         row: dict = {"parameters": count}
+        calls = {}
         for name, program in programs.items():
             call, seconds = compiled(program, start)
+            calls[name] = call
             # on one core, and of the processor's seconds: others' work counts in neither
             row[name], row[f"{name} compile"] = best_of(call, 8, time.process_time), seconds
+        if isinstance(jf.adjoint_for(count), diffrax.ForwardMode):
+            points = start[None]
+            judge(objective, points, None, None)  # compiles
+            by_clock = best_of(lambda points=points: judge(objective, points, None, None), 8)
+            row["groups / cost"] = by_clock / best_of(calls["cost"], 8)
         row["forward / cost"] = row["forward"] / row["cost"]
         row["reverse / cost"] = row["reverse"] / row["cost"]
         found.append(row)
