@@ -175,7 +175,8 @@ def main() -> None:
     parser.add_argument("--plant", default="single_link")
     parser.add_argument("--effects", default="all", help="all, outside, nothing, or names; a+b for a pair")
     parser.add_argument("--gaps", default="1,3,10", help="projected gap over the noise floor")
-    parser.add_argument("--seeds", type=int, default=3, help="how many, from 0")
+    parser.add_argument("--seeds", type=int, default=3, help="how many")
+    parser.add_argument("--first", type=int, default=0, help="the first of the seeds")
     parser.add_argument("--noise", default="white", choices=["white", "coloured"])
     parser.add_argument("--also", default="", help="channels to log beside the usual: rate,strain")
     given = parser.parse_args()
@@ -184,7 +185,7 @@ def main() -> None:
         given.plant,
         chosen(given.plant, given.effects),
         gaps,
-        list(range(given.seeds)),
+        list(range(given.first, given.first + given.seeds)),
         given.noise,
         tuple(filter(None, given.also.split(","))),
     )

@@ -79,13 +79,15 @@ def fit(
     iterations: int = 4,
     tolerance: float = 3e-4,
     fresh: bool = False,
+    most: int = MOST,
 ) -> Fit:
     """Minimise misfit over `horizon` pieces plus prior; the starts of the pieces move along.
 
     Slopes of an earlier fit serve as long as they foretell how far the cost falls; with
-    `fresh`, they are taken anew at the end. Ends when slopes that hold have nothing more to
-    gain, when an iteration gains less than `tolerance` a reading, or, after `iterations` of
-    them, less than the share SLOW of the cost. Pieces that run away in a step stay where they were.
+    `fresh`, they are taken anew at the end; with `most` of 1 they are never. Ends when slopes
+    that hold have nothing more to gain, when an iteration gains less than `tolerance` a reading,
+    or, after `iterations` of them, less than the share SLOW of the cost. Pieces that run away in
+    a step stay where they were.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -108,7 +110,7 @@ def fit(
     damping = 0.0
     kept = None
     renew = False
-    for iteration in range(MOST):
+    for iteration in range(most):
         linears = [problem.linearise(run, vector, columns, fresh=renew) for run in runs]
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)

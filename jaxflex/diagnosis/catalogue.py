@@ -72,7 +72,7 @@ EITHER_SIGN = {
     "sensor_bias", "sensor_gain", "sensor_drift",
 }  # fmt: skip
 # and where they make sense only within bounds
-BOUNDS = {"centrifugal_stiffening": (0.3, 30.0), "sensor_gain": (-0.31, 0.31)}
+BOUNDS = {"centrifugal_stiffening": (0.3, 30.0), "sensor_gain": (-0.75, 2.0)}
 
 
 def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:

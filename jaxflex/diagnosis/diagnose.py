@@ -14,6 +14,7 @@ from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
 from .loose_joint import loose_joints
 from .result import Diagnosis
 from .rivals import weigh
+from .signs import righted
 from .study import Study
 
 SOLVED = 0.2  # of what is left of a gap: a joint that comes apart, with all it adds, must leave less
@@ -35,6 +36,7 @@ def diagnose(
     """
     began = time.perf_counter()
     say = say or (lambda line: None)
+    recordings = righted(file, recordings)
 
     def study(file: ArmFile, divided: bool) -> Study:
         begun = Study(file, recordings, divided, say)

@@ -1,5 +1,7 @@
 """The search: effects are added one at a time until nothing in the catalogue stands out."""
 
+import itertools
+
 from ..effects import EFFECTS
 from .departure import is_suspect
 from .hypothesis import (
@@ -14,6 +16,7 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
+    freedom,
 )
 from .rivals import prune
 
@@ -21,6 +24,7 @@ MOST_EFFECTS = 5
 SHORT_LIST = 3
 SOME = 3  # one in so many pieces tells parts of the arm apart
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
+WORSE = 1e-3  # misfit a reading by which a fit with one more effect is no fit
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
@@ -128,17 +132,31 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) 
     """The few that explain most over the shortest horizon, each fitted in full.
 
     Parameters that were bent to imitate an effect mislead a test to first order. A part of the pieces
-    says as well as all which of them it is.
+    says as well as all which of them it is, and one set of slopes which of them it is not, unless
+    what it comes to is worse than nothing added.
     """
-    best: dict[tuple[str, str], tuple[float, Ranked]] = {}
     search.restart(starts)
     few = Search(search.problem, [run.thinned(SOME) for run in search.runs], search.say)
+    wanted = [freedom(few.parameters, (*base.effects, item.candidate)).columns for item in items]
+    columns = sorted(set(itertools.chain.from_iterable(wanted)))
+    for run in few.runs:
+        few.problem.linearise(run, base.fit.vector, columns)
     starts = few.starts()
-    for item in items:
+    without = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
+    quick = [few.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
+    failed = [
+        item for item, cost in zip(items, quick, strict=True) if cost > without.cost + without.count * WORSE
+    ]
+    order = sorted(zip(quick, items, strict=True), key=lambda entry: entry[0])
+    likely = [item for _, item in order if item not in failed][: 2 * SHORT_LIST]
+    best: dict[tuple[str, str], tuple[float, Ranked]] = {}
+    for item in (*likely, *failed):
         cost = few.confirm(base, starts, item, HORIZONS[0]).fit.cost
         if item.candidate.key not in best or cost < best[item.candidate.key][0]:
             best[item.candidate.key] = cost, item
-    return [item for _, item in sorted(best.values(), key=lambda entry: entry[0])][:SHORT_LIST]
+    ranked = sorted(best.values(), key=lambda entry: entry[0])[:SHORT_LIST]
+    enough = NEAR * (without.cost - ranked[0][0])
+    return [item for cost, item in ranked if without.cost - cost >= enough]
 
 
 def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
@@ -152,7 +170,8 @@ def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
 def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
     """Of the hypotheses that explain practically the same, the one with the fewest parameters.
 
-    Unless one of the others follows clearly better for longer than they were fitted.
+    Of as many parameters the one that beats the other at the horizon where they differ most. Unless
+    one of the others follows clearly better for longer than they were fitted.
     """
     most = max(strength for strength, _, _ in confirmed)
     tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
@@ -163,9 +182,15 @@ def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
         return search.climb(entry[1].effects, entry[1].fit.vector, ceiling=CLOSE)
 
     chosen = tied[0]
+    for entry in confirmed:
+        alike = entry[1].effects[-1].count == chosen[1].effects[-1].count
+        if alike and entry[1].strength(chosen[1]) > chosen[1].strength(entry[1]):
+            chosen = entry
     further = followed(chosen) if len(tied) > 1 and chosen[1].horizon < HORIZONS[-1] else None
     if further is not None and further.fit.level > FAIR:
-        for entry in tied[1:]:
+        for entry in tied:
+            if entry is chosen:
+                continue
             other = followed(entry)
             if other.strength(further) > STRONG and _worth_it(further, other):
                 chosen, further = entry, other

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
-from .calibrate import Fit, Freedom, fit
+from .calibrate import MOST, Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
@@ -185,9 +185,9 @@ class Search:
 
     def climb(
         self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],
-        iterations: int = 4,
+        iterations: int = 4, most: int = MOST,
     ) -> Hypothesis:  # fmt: skip
-        """Fit over longer and longer horizons, stopping where the misfit is above `ceiling`."""
+        """Fit over longer and longer horizons, stopping where the misfit is above `ceiling`; the rest as for `fit`."""
         free = freedom(self.parameters, effects)
         found, costs = None, {}
         for horizon in HORIZONS:
@@ -197,7 +197,7 @@ class Search:
                 for run in self.runs:
                     self.problem.join(run, vector)
             starts = self.starts()
-            longer = fit(self.problem, self.runs, vector, free, horizon, iterations)
+            longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)
             if found is not None and not longer.level < RUNAWAY * (1 + found.level):
                 self.restart(starts)  # the motion cannot be followed for so long
                 break
@@ -323,11 +323,13 @@ class Search:
         size = (found.fit.vector[self.parameters.position(*last.key, name)] for name in last.amplitudes)
         return not last.amplitudes or plausible(last, tuple(size))
 
-    def confirm(self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int) -> Hypothesis:
-        """The candidate added to `base` in full, fitted from `starts`."""
+    def confirm(
+        self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int, most: int = MOST
+    ) -> Hypothesis:
+        """The candidate added to `base` in full, fitted from `starts`; `most` as for `fit`."""
         self.restart(starts)
         vector = adopt(self.parameters, base.fit.vector, ranked.candidate, ranked.step)
-        return self.climb((*base.effects, ranked.candidate), vector, to=to, iterations=4)
+        return self.climb((*base.effects, ranked.candidate), vector, to=to, most=most)
 
 
 class Outcome:
