@@ -137,6 +137,14 @@ def adopt(
     return vector
 
 
+def amplitudes_of(parameters: Parameters, vector: np.ndarray, candidate: Candidate) -> tuple[float, ...]:
+    """The step by which `adopt` makes a candidate as large as it is in `vector`."""
+    found = [float(vector[parameters.position(*candidate.key, name)]) for name in candidate.amplitudes]
+    if candidate.effect == "cable_stiffness":
+        found.append(found[0] * float(vector[parameters.position(*candidate.key, "rest_angle")]))
+    return tuple(found)
+
+
 def without(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> np.ndarray:
     """`vector` with the effect absent again."""
     vector = vector.copy()

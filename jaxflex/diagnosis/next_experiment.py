@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 
 from .catalogue import Candidate, Motion
-from .hypothesis import HORIZONS, Hypothesis, Search, freedom
+from .hypothesis import HORIZONS, Hypothesis, Search, amplitudes_of, freedom
 from .screen import with_candidates
 from .shooting import Run
 
@@ -51,7 +51,7 @@ def separations(search: Search, final: Hypothesis, first: Candidate, second: Can
     run = search.runs[0]
     rest = tuple(effect for effect in final.effects if effect.key not in (first.key, second.key))
     free = freedom(search.parameters, rest)
-    size = np.array([vector[search.parameters.position(*first.key, name)] for name in first.amplitudes])
+    size = np.array(amplitudes_of(search.parameters, vector, first))
     found = {}
     for name, change in MENU.items():
         other = simulated(search, run, vector, change(run.command))
