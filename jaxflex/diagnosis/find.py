@@ -142,21 +142,21 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) 
     for run in few.runs:
         few.problem.linearise(run, base.fit.vector, columns)
     starts = few.starts()
-    without = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
+    none = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
     quick = [few.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
-    failed = [
-        item for item, cost in zip(items, quick, strict=True) if cost > without.cost + without.count * WORSE
-    ]
     order = sorted(zip(quick, items, strict=True), key=lambda entry: entry[0])
-    likely = [item for _, item in order if item not in failed][: 2 * SHORT_LIST]
+    limit = none.cost + none.count * WORSE
+    likely = [item for cost, item in order if cost <= limit][: 2 * SHORT_LIST]
+    failed = [item for cost, item in order if not cost <= limit]
     best: dict[tuple[str, str], tuple[float, Ranked]] = {}
     for item in (*likely, *failed):
         cost = few.confirm(base, starts, item, HORIZONS[0]).fit.cost
         if item.candidate.key not in best or cost < best[item.candidate.key][0]:
             best[item.candidate.key] = cost, item
+    few.restart(starts)
+    nothing = few.climb(base.effects, base.fit.vector, to=HORIZONS[0]).fit.cost
     ranked = sorted(best.values(), key=lambda entry: entry[0])[:SHORT_LIST]
-    enough = NEAR * (without.cost - ranked[0][0])
-    return [item for cost, item in ranked if without.cost - cost >= enough]
+    return [item for cost, item in ranked if nothing - cost >= NEAR * (nothing - ranked[0][0])]
 
 
 def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
