@@ -16,6 +16,7 @@ SUSPECT = 0.99  # of arms as stated, the share whose parameters depart less: bey
 BENT = 0.999  # the same, beyond which something is missing
 FORM_ERROR = 0.01  # of its effect: what a law of friction or contact may differ from the true one by
 MOST_ERROR = 1.8  # times the usual departure: what such an error is excused for before parts have been tried
+UNLIKELY = 12.0  # gain of a part that sets strained parameters straight: one arm in a hundred strains
 FARTHEST = 0.4  # of the departure of one parameter, to be compared with that of all
 
 
@@ -49,6 +50,17 @@ def is_suspect(parameters: Parameters, hypothesis: Hypothesis, explained: float 
     usual = _usual(SUSPECT, _stated(parameters))
     error = min(_error(parameters, hypothesis, explained), MOST_ERROR * usual)
     return bool(departure(parameters, hypothesis) > np.hypot(usual, error))
+
+
+def straightens(
+    parameters: Parameters, before: Hypothesis, after: Hypothesis, explained: float = 0.0
+) -> bool:
+    """True if parameters that went too far without what `after` adds go no farther than usual with it.
+
+    `explained` as for `is_bent`.
+    """
+    bent, straight = (is_suspect(parameters, found, explained) for found in (before, after))
+    return bent and not straight and after.gain(before) > UNLIKELY
 
 
 def is_bent(parameters: Parameters, hypothesis: Hypothesis, explained: float) -> bool:

@@ -3,7 +3,7 @@
 import itertools
 
 from ..effects import EFFECTS
-from .departure import is_suspect
+from .departure import is_suspect, straightens
 from .hypothesis import (
     CLOSE,
     FAIR,
@@ -29,7 +29,6 @@ SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for sm
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
 FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
-UNLIKELY = 12.0  # gain of a part that sets strained parameters straight: one arm in a hundred strains
 HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
 
 Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
@@ -97,9 +96,9 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
         if not confirmed:
             break
         strength, best, best_starts = simplest(search, confirmed)
-        straight = not is_suspect(search.parameters, best, outcome.explained)
-        straightens = suspect and straight and best.gain(fitted) > UNLIKELY
-        if not (strength > STRONG or straightens):
+        if not (
+            strength > STRONG or (suspect and straightens(search.parameters, fitted, best, outcome.explained))
+        ):
             break
         base, base_starts = best, best_starts
     assert outcome is not None

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from .departure import straightens
 from .hypothesis import CLOSE, STRONG, Outcome, Search, without
 from .loose_joint import is_of_loose_joint
 
@@ -22,7 +23,10 @@ def prune(search: Search, outcome: Outcome) -> None:
         rest = tuple(e for e in outcome.final.effects if e is not effect)
         vector = without(search.parameters, outcome.final.fit.vector, effect)
         found = search.climb(rest, vector, ceiling=CLOSE, iterations=3)
-        if found.horizon == outcome.final.horizon and outcome.final.strength(found) < STRONG:
+        needed = outcome.final.strength(found) >= STRONG or straightens(
+            search.parameters, found, outcome.final, outcome.explained
+        )
+        if found.horizon == outcome.final.horizon and not needed:
             search.say(f"{effect.effect} at {effect.location} is no longer needed")
             outcome.final, outcome.final_starts = found, search.starts()
         else:

@@ -1,12 +1,14 @@
 """What departures of stated parameters are excused for."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import jaxflex as jf
 from jaxflex.diagnosis.calibrate import Fit, Freedom
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.departure import MOST_ERROR, is_bent, is_suspect
+from jaxflex.diagnosis.departure import MOST_ERROR, is_bent, is_suspect, straightens
 from jaxflex.diagnosis.hypothesis import Hypothesis
 from jaxflex.diagnosis.normal import Normal
 from jaxflex.diagnosis.parameters import Parameters
@@ -54,3 +56,11 @@ def test_what_is_bent_was_suspect(parameters):
     for departure in np.linspace(0.5, 6, 12):
         if is_bent(parameters, gone(parameters, departure), 0.0):
             assert is_suspect(parameters, gone(parameters, departure))
+
+
+def test_a_part_that_sets_strained_parameters_straight_is_needed(parameters):
+    bent, usual = gone(parameters, 2.0), gone(parameters, 1.0)
+    straight = dataclasses.replace(usual, costs={1: 3e4 - 50.0})
+    assert straightens(parameters, bent, straight)
+    assert not straightens(parameters, usual, straight)
+    assert not straightens(parameters, bent, dataclasses.replace(usual, costs={1: 3e4 - 5.0}))
