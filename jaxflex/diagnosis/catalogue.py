@@ -23,7 +23,7 @@ from .parameters import Parameters
 from .shooting import Problem, Run
 
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
-WAVES = 1.5  # of a ripple that the motion must span
+WAVES = 1.0  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
 LEAST_RISE = 0.05  # of friction towards rest, of its level: below it there is none
 SATURATION = (0.4, 0.55, 0.7, 0.8, 0.88, 0.95, 0.98)  # of the largest command
