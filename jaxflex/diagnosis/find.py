@@ -16,6 +16,7 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
+    amplitudes_of,
     freedom,
 )
 from .rivals import prune
@@ -100,11 +101,25 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             strength > STRONG or (suspect and straightens(search.parameters, fitted, best, outcome.explained))
         ):
             break
+        outcome.close[best.effects[-1].key] = nearly_as_good(search, fitted, best, confirmed)
         base, base_starts = best, best_starts
     assert outcome is not None
     search.restart(outcome.final_starts)
     prune(search, outcome)
     return outcome
+
+
+def nearly_as_good(
+    search: Search, before: Hypothesis, best: Hypothesis, confirmed: list[Confirmed]
+) -> list[Ranked]:
+    """What else was added to `before` and explained as much as `best` does, to within what chance may bring."""
+    found: dict[tuple[str, str], Ranked] = {}
+    for strength, other, _ in confirmed:
+        candidate = other.effects[-1]
+        if candidate.key != best.effects[-1].key and best.strength(other) < 1.0:
+            step = amplitudes_of(search.parameters, other.fit.vector, candidate)
+            found[candidate.key] = Ranked(candidate, step, other.gain(before), strength)
+    return sorted(found.values(), key=lambda item: -item.strength)
 
 
 def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:

@@ -351,6 +351,7 @@ class Outcome:
         self.level = np.inf  # misfit a reading over the longest horizon
         self.nominal_level = np.inf  # the same without any effect
         self.rivals: list[tuple[int, Hypothesis]] = []
+        self.close: dict[tuple[str, str], list[Ranked]] = {}  # what did as well when an effect was added
         self.gains: list[float] = []
 
     @property

@@ -4,10 +4,11 @@ import dataclasses
 
 import numpy as np
 
-from .departure import straightens
+from .departure import is_suspect, straightens
 from .hypothesis import CLOSE, STRONG, Outcome, Search, without
 from .loose_joint import is_of_loose_joint
 
+MOST = 2  # rivals of an effect that are tried
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
 HARDLY_MORE = 0.5  # of what is left in either case: a rival that leaves this much more is no worse
 
@@ -44,12 +45,18 @@ def weigh(search: Search, outcome: Outcome) -> None:
         final, starts = outcome.final, outcome.final_starts
         rest = tuple(e for e in final.effects if e is not effect)
         search.restart(starts)
-        found = search.rivals(final, effect)
-        for item, share in found[:2]:
+        found = search.rivals(final, effect)[:MOST]
+        ranked = {item.candidate.key for item, _ in found} | {e.key for e in final.effects}
+        close = [item for item in outcome.close.get(effect.key, ()) if item.candidate.key not in ranked]
+        for item, share in (*found, *((item, item.gain) for item in close[:MOST])):
             vector = without(search.parameters, final.fit.vector, effect)
             base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
             rival = search.confirm(base, starts, item, final.horizon)
             if rival.horizon != final.horizon or not search.sensible(rival):
+                continue
+            if is_suspect(search.parameters, rival, outcome.explained) and not is_suspect(
+                search.parameters, final, outcome.explained
+            ):
                 continue
             lost = final.gain(rival)
             worth, left = max(share, outcome.gains[place]), final.fit.cost - final.fit.count
