@@ -37,7 +37,7 @@ def righted(file: ArmFile, recordings: Sequence[Recording]) -> list[Recording]:
     names = (*inputs, *problem.setting.channels)
     wrong: frozenset[str] = frozenset()
     level = misfit(np.ones(len(names)))
-    while level > ASTRAY:
+    while ASTRAY < level < np.inf:
         tried = [wrong ^ {name} for name in names]
         levels = {turn: misfit(np.array([-1.0 if n in turn else 1.0 for n in names])) for turn in tried}
         best = min(levels, key=lambda turn: levels[turn])
