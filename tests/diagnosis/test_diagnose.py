@@ -83,7 +83,7 @@ def test_parameters_do_not_depend_on_what_was_foretold_before(hidden):
         pytest.param(
             "viscous_friction", "in how far the stated parameters would have to go", marks=pytest.mark.slow
         ),
-        ("joint_flexibility", "between rotor and load"),
+        pytest.param("joint_flexibility", "between rotor and load", marks=pytest.mark.slow),
     ],
 )
 def test_what_a_bare_axis_hides_is_named(tmp_path, name, where_it_shows):
