@@ -10,6 +10,7 @@ from .hypothesis import (
     HORIZONS,
     LITTLE,
     PARTS,
+    SOME,
     STRONG,
     Hypothesis,
     Outcome,
@@ -23,7 +24,6 @@ from .rivals import prune
 
 MOST_EFFECTS = 5
 SHORT_LIST = 3
-SOME = 3  # one in so many pieces tells parts of the arm apart
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 WORSE = 1e-3  # misfit a reading by which a fit with one more effect is no fit
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
@@ -156,10 +156,10 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) 
     for run in few.runs:
         few.problem.linearise(run, base.fit.vector, columns)
     starts = few.starts()
-    none = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
+    once = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
     quick = [few.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
     order = sorted(zip(quick, items, strict=True), key=lambda entry: entry[0])
-    limit = none.cost + none.count * WORSE
+    limit = once.cost + once.count * WORSE
     likely = [item for cost, item in order if cost <= limit][: 2 * SHORT_LIST]
     failed = [item for cost, item in order if not cost <= limit]
     best: dict[tuple[str, str], tuple[float, Ranked]] = {}

@@ -39,6 +39,7 @@ BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal parameters could be bent to imitate
 FARTHEST_REST = 2 * np.pi  # rad, of a cable
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
+SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 

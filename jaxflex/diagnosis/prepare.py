@@ -145,7 +145,7 @@ def make_run(recording: Recording, inputs: Sequence[str], setting: Setting, begi
     total = pieces * length
     padded = np.pad(reading, ((0, total - len(times)), (0, 0)), mode="edge").reshape(pieces, length, -1)
     valid = (np.arange(total) < len(times)).reshape(pieces, length)
-    starts = first_starts(setting.parameters, setting.channels, times, reading, command, length, dt)
+    starts = first_starts(setting, times, reading, command)
     return Run(times, command, padded, valid, starts)
 
 
@@ -165,12 +165,10 @@ def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[
     return found
 
 
-def first_starts(
-    parameters: Parameters, channels: tuple[str, ...], times: np.ndarray, reading: np.ndarray,
-    command: np.ndarray, length: int, dt: float,
-) -> np.ndarray:  # fmt: skip
+def first_starts(setting: Setting, times: np.ndarray, reading: np.ndarray, command: np.ndarray) -> np.ndarray:
     """A state for the start of each piece, from smoothed readings alone."""
-    arm = parameters.arm
+    arm, channels = setting.parameters.arm, setting.channels
+    length, dt = setting.length, setting.sample_time
     model = arm.assemble()
     count = -(-len(times) // length)
     at = np.minimum(np.arange(count) * length, len(times) - 1)

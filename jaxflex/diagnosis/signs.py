@@ -10,11 +10,10 @@ import numpy as np
 
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
-from .hypothesis import settle
+from .hypothesis import SOME, settle
 from .prepare import first_starts, make_problem, wanted_channels
 from .shooting import Problem, Run
 
-SOME = 3  # one in so many pieces tells
 ASTRAY = 50.0  # misfit a reading over the shortest horizon, in units of the noise: signs are tried beyond it
 BETTER = 0.25  # of the misfit: what is left at most where a sign was wrong
 
@@ -50,13 +49,10 @@ def righted(file: ArmFile, recordings: Sequence[Recording]) -> list[Recording]:
 
 def _mirrored(problem: Problem, run: Run, signs: np.ndarray) -> Run:
     """The run with its commands and readings times `signs`, its starts guessed anew."""
-    setting = problem.setting
     of_commands, of_readings = np.split(signs, [run.command.shape[1]])
     command, reading = of_commands * run.command, of_readings * run.reading
     rows = reading.reshape(-1, reading.shape[-1])[: len(run.times)]
-    starts = first_starts(
-        setting.parameters, setting.channels, run.times, rows, command, setting.length, setting.sample_time
-    )
+    starts = first_starts(problem.setting, run.times, rows, command)
     return Run(run.times, command, reading, run.valid, starts)
 
 
