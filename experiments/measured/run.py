@@ -4,19 +4,18 @@ from pathlib import Path
 
 import jaxflex as jf
 
+from .dry import dry_torque
 from .force import force_error, least_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 MACHINES = ("emps", "quanser_flexible_link")
+CORNERS = (8.0, 12.0, 20.0, 30.0)  # Hz
+SLOWEST = (0.0, 0.5)  # rad/s
 
 
-def diagnosed(machine: str) -> tuple[jf.Recording, jf.Diagnosis]:
-    """The recording of a machine, and what the diagnosis says of it."""
-    file, recording = (
-        jf.read_arm_file(DATA / machine / "arm.toml"),
-        jf.read_recording(DATA / machine / "run_1.csv"),
-    )
-    return recording, jf.diagnose(file, [recording])
+def read(machine: str) -> tuple[jf.ArmFile, jf.Recording]:
+    """The arm file of a machine, and its recording."""
+    return jf.read_arm_file(DATA / machine / "arm.toml"), jf.read_recording(DATA / machine / "run_1.csv")
 
 
 def figures_of(found: jf.Diagnosis) -> dict:
@@ -44,11 +43,19 @@ def run(folder: Path, reduced: bool) -> dict:
         raise SystemExit(f"the recordings are not here: {DATA} is absent")
     figures = {}
     for machine in MACHINES[:1] if reduced else MACHINES:
-        recording, found = diagnosed(machine)
+        file, recording = read(machine)
+        found = jf.diagnose(file, [recording])
         figures[machine] = figures_of(found)
         if "torque_1" in recording.channels and not found.improved.links:
             figures[machine]["relative_force_error"] = {
                 "best inertia and viscous friction": least_error(recording),
                 "with what was named": force_error(found.improved, recording),
+            }
+        if file.arm.links:
+            figures[machine]["coulomb torque by least squares [N m]"] = {
+                f"from {slowest:g} rad/s": {
+                    f"{corner:g} Hz": dry_torque(file.arm, recording, corner, slowest) for corner in CORNERS
+                }
+                for slowest in SLOWEST
             }
     return figures

@@ -11,7 +11,7 @@ from .find import HALFWAY, find
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
-from .loose_joint import loose_joints
+from .loose_joint import LESS, loose_joints
 from .result import Diagnosis
 from .rivals import weigh
 from .signs import righted
@@ -38,25 +38,30 @@ def diagnose(
     say = say or (lambda line: None)
     recordings = righted(file, recordings)
 
-    def study(file: ArmFile, divided: bool) -> Study:
+    def study(divided: bool) -> Study:
         begun = Study(file, recordings, divided, say)
         begun.outcome = find(begun.search)
         return begun
 
-    chosen = study(file, divided=False)
+    chosen = study(divided=False)
     divided = len(recordings) > 1 and chosen.outcome.level < FAIR and chosen.foretold().level > AT_FLOOR
     if divided:
         say("the runs held out show what the others do not: the end of each is held out instead")
-        chosen = study(file, divided)
+        chosen = study(divided)
     stated = nominally(chosen)
 
     def gauged(chosen: Study) -> Study:
-        file = by_gauge(chosen.file) if _astray(chosen) > CLOSE and _deflections(chosen) else None
-        if file is None:
+        final = chosen.outcome.final
+        other_file = by_gauge(chosen.file) if final.closest > CLOSE and _deflections(chosen) else None
+        if other_file is None:
             return chosen
         say("the deflections may be those that a strain gauge stands for")
-        other = study(file, divided)
-        if not _astray(other) < HALFWAY * _astray(chosen):
+        other = Study(other_file, recordings, divided, say)
+        with_gauge = other.search.thinned().climb(final.effects, final.fit.vector, to=HORIZONS[0])
+        if not with_gauge.closest < LESS * final.closest:
+            return chosen
+        other.outcome = find(other.search)
+        if not other.outcome.final.closest < HALFWAY * final.closest:
             return chosen
         other.notes = (*other.notes, BY_GAUGE)
         return other
@@ -65,7 +70,7 @@ def diagnose(
         if not _leaves_much(chosen):
             return chosen
         say("what is left may lie between a motor and its link")
-        for loose, start in loose_joints(chosen.file, recordings, divided, say):
+        for loose, start in loose_joints(chosen, recordings, divided):
             loose.outcome = find(loose.search, start)
             if _solves(loose, chosen):
                 loose.outcome.nominal_level = chosen.outcome.nominal_level  # of the arm as it was stated
@@ -78,12 +83,6 @@ def diagnose(
         chosen = other_arm(chosen)
     weigh(chosen.search, chosen.outcome)
     return describe(chosen, stated, began)
-
-
-def _astray(study: Study) -> float:
-    """Misfit a reading over the shortest horizon, in units of the noise."""
-    final = study.outcome.final
-    return final.costs[HORIZONS[0]] / final.fit.count
 
 
 def _deflections(study: Study) -> list[str]:

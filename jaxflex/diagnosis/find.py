@@ -10,7 +10,6 @@ from .hypothesis import (
     HORIZONS,
     LITTLE,
     PARTS,
-    SOME,
     STRONG,
     Hypothesis,
     Outcome,
@@ -62,7 +61,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
             base, base_starts = start, begin
             continue
         explained = outcome.explained_over()
-        near = fitted.costs[HORIZONS[0]] < CLOSE * fitted.fit.count
+        near = fitted.closest < CLOSE
         suspect = start is None and is_suspect(search.parameters, fitted, outcome.explained)
         if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not suspect:
             break
@@ -150,7 +149,7 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) 
     what it comes to is worse than nothing added.
     """
     search.restart(starts)
-    few = Search(search.problem, [run.thinned(SOME) for run in search.runs], search.say)
+    few = search.thinned()
     wanted = [freedom(few.parameters, (*base.effects, item.candidate)).columns for item in items]
     columns = sorted(set(itertools.chain.from_iterable(wanted)))
     for run in few.runs:

@@ -56,6 +56,14 @@ class Hypothesis:
     horizon: int
     costs: dict[int, float]
 
+    @property
+    def closest(self) -> float:
+        """Misfit a reading over the shortest horizon, in units of the noise.
+
+        Pieces that are joined are pieces that happen to meet: what longer horizons leave bounds it.
+        """
+        return min(self.costs.values()) / self.fit.count
+
     def strength(self, other: "Hypothesis", explained: dict[int, float] | None = None) -> float:
         """By how much it beats another, in units of what noise and the model's own error may bring.
 
@@ -179,6 +187,10 @@ class Search:
         self.runs = runs
         self.parameters = problem.setting.parameters
         self.say = say
+
+    def thinned(self) -> "Search":
+        """The same search with one piece in SOME."""
+        return Search(self.problem, [run.thinned(SOME) for run in self.runs], self.say)
 
     def starts(self) -> Starts:
         """The starts of all pieces, with the slopes there, to come back to."""
@@ -333,12 +345,18 @@ class Search:
         return not last.amplitudes or plausible(last, tuple(size))
 
     def confirm(
-        self, base: Hypothesis, starts: Starts, ranked: Ranked, to: int, most: int = MOST
+        self,
+        base: Hypothesis,
+        starts: Starts,
+        ranked: Ranked,
+        to: int,
+        ceiling: float = np.inf,
+        most: int = MOST,
     ) -> Hypothesis:
-        """The candidate added to `base` in full, fitted from `starts`; `most` as for `fit`."""
+        """The candidate added to `base` in full, fitted from `starts`; the rest as for `climb`."""
         self.restart(starts)
         vector = adopt(self.parameters, base.fit.vector, ranked.candidate, ranked.step)
-        return self.climb((*base.effects, ranked.candidate), vector, to=to, most=most)
+        return self.climb((*base.effects, ranked.candidate), vector, ceiling, to, most=most)
 
 
 class Outcome:

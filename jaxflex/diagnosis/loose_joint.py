@@ -16,7 +16,7 @@ from .flanks import choose_flanks, press
 from .hypothesis import CLOSE, Hypothesis, Search, adopt, freedom
 from .parameters import Parameters
 from .shooting import LOST_PIECE
-from .study import Say, Study
+from .study import Study
 
 FLANKS = {  # of CONTACT: value, and relative uncertainty
     "contact_stiffness": (30.0, 1.5),  # N m/rad; a fit finds its way from soft flanks to hard ones, not back
@@ -31,6 +31,9 @@ SPRING = {  # the same, of a joint whose flexibility is all there is: hard flank
 COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
+LESS = (
+    0.8  # of the misfit over the shortest horizon: what a loose joint must leave less of to be tried in full
+)
 TURNS = 3  # of trying the other flank and fitting again
 HELPS = 0.9  # of the cost: a turn that leaves more has not helped
 
@@ -46,33 +49,54 @@ def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]])
 
 
 def loose_joints(
-    file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Say
+    other: Study, recordings: Sequence[Recording], divided: bool
 ) -> list[tuple[Study, Hypothesis]]:
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
-    Over the shortest horizon.
+    Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
+    that `other` found, leaves clearly less than `other` does: else it is left out.
     """
     found = []
-    for joint, own in enumerate(file.arm.joints):
-        lumped = any(getattr(link, "model", "") == "lumped" for link in file.arm.links[joint : joint + 1])
+    for joint, own in enumerate(other.file.arm.joints):
+        lumped = any(
+            getattr(link, "model", "") == "lumped" for link in other.file.arm.links[joint : joint + 1]
+        )
         if lumped or own.play is not None:
             continue
         spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
         for contact, candidate, sizes in ((SPRING, spring, COMPLIANCES), (FLANKS, play, GAPS)):
-            study = Study(loosened(file, joint, contact), recordings, divided, say)
-            fitted = best_from(study.search, candidate, sizes)
-            say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
-            tried.append((study, fitted))
-            if file.arm.links and fitted.fit.level < GONE:
+            study = Study(loosened(other.file, joint, contact), recordings, divided, other.search.say)
+            few = study.search.thinned()
+            fitted, size = best_from(few, candidate, sizes)
+            other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
+            tried.append((study, few, fitted, size))
+            if other.file.arm.links and fitted.fit.level < GONE:
                 break
-        found.append(min(tried, key=lambda entry: entry[1].fit.cost))
+        study, few, fitted, size = min(tried, key=lambda entry: entry[2].fit.cost)
+        with_others = joined(few, fitted, other)
+        if with_others.closest < LESS * other.outcome.final.closest:
+            found.append((study, best_from(study.search, fitted.effects[0], [size])[0]))
     return found
 
 
-def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> Hypothesis:
+def joined(search: Search, loose: Hypothesis, other: Study) -> Hypothesis:
+    """What a loose joint comes to along with the effects that `other` found for a joint that is not."""
+    final, parameters = other.outcome.final, search.parameters
+    others = tuple(effect for effect in final.effects if effect.key != loose.effects[0].key)
+    vector = loose.fit.vector.copy()
+    for effect in others:
+        for name in (*effect.amplitudes, *(field for field, _ in effect.shape)):
+            own = other.search.parameters.position(*effect.key, name)
+            vector[parameters.position(*effect.key, name)] = final.fit.vector[own]
+    return search.climb((*loose.effects, *others), vector, to=1) if others else loose
+
+
+def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> tuple[Hypothesis, float]:
     """The candidate fitted from the best of some sizes: with its contact as guessed, then with everything.
+
+    And that size.
 
     From the parameters as stated: a misfit that a loose joint leaves bends them.
     """
@@ -87,11 +111,11 @@ def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> H
         if candidate.effect == "backlash":
             press(search.problem, search.runs, with_it, candidate.index)
         search.settle(with_it)
-        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts()))
-    best, starts = min(begun, key=lambda entry: entry[0].cost)
+        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts(), size))
+    best, starts, size = min(begun, key=lambda entry: entry[0].cost)
     search.restart(starts)
     fitted = search.climb((candidate,), best.vector, to=1, iterations=8)
-    return turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted
+    return (turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted), size
 
 
 def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:

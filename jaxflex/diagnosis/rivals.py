@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, STRONG, Outcome, Search, without
+from .hypothesis import CLOSE, STRONG, Outcome, Search, amplitudes_of, without
 from .loose_joint import is_of_loose_joint
 
 MOST = 2  # rivals of an effect that are tried
@@ -23,11 +23,13 @@ def prune(search: Search, outcome: Outcome) -> None:
         search.restart(outcome.final_starts)
         rest = tuple(e for e in outcome.final.effects if e is not effect)
         vector = without(search.parameters, outcome.final.fit.vector, effect)
-        found = search.climb(rest, vector, ceiling=CLOSE, iterations=3)
+        size = amplitudes_of(search.parameters, outcome.final.fit.vector, effect)
+        gone = bool(size) and not any(size)  # another took over all that it did
+        found = search.climb(rest, vector, ceiling=np.inf if gone else CLOSE, iterations=3)
         needed = outcome.final.strength(found) >= STRONG or straightens(
             search.parameters, found, outcome.final, outcome.explained
         )
-        if found.horizon == outcome.final.horizon and not needed:
+        if gone or (found.horizon == outcome.final.horizon and not needed):
             search.say(f"{effect.effect} at {effect.location} is no longer needed")
             outcome.final, outcome.final_starts = found, search.starts()
         else:
@@ -46,12 +48,13 @@ def weigh(search: Search, outcome: Outcome) -> None:
         rest = tuple(e for e in final.effects if e is not effect)
         search.restart(starts)
         found = search.rivals(final, effect)[:MOST]
+        hopeless = CLOSE * max(final.closest, 1.0)  # over a shorter horizon
         ranked = {item.candidate.key for item, _ in found} | {e.key for e in final.effects}
         close = [item for item in outcome.close.get(effect.key, ()) if item.candidate.key not in ranked]
         for item, share in (*found, *((item, item.gain) for item in close[:MOST])):
             vector = without(search.parameters, final.fit.vector, effect)
             base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
-            rival = search.confirm(base, starts, item, final.horizon)
+            rival = search.confirm(base, starts, item, final.horizon, ceiling=hopeless)
             if rival.horizon != final.horizon or not search.sensible(rival):
                 continue
             if is_suspect(search.parameters, rival, outcome.explained) and not is_suspect(

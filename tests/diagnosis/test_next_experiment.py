@@ -1,33 +1,14 @@
 """Which experiment tells two effects apart."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
-import jaxflex as jf
-from controllers import Replayed, Step
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.hypothesis import Hypothesis, Search, adopt, amplitudes_of
+from jaxflex.diagnosis.hypothesis import Hypothesis, adopt, amplitudes_of
 from jaxflex.diagnosis.next_experiment import MENU, separations
-from jaxflex.diagnosis.prepare import make_problem
 
 CABLE = Candidate("cable_stiffness", "joint_1", ("stiffness",))
 OFFSET = Candidate("load_torque_bias", "joint_1", ("torque",))
-
-
-@pytest.fixture(scope="module")
-def search():
-    """A bare axis that swings to and fro for two seconds."""
-    motor = jf.DCMotor(1.2, 0.06, 0.06)
-    arm = jf.Arm((), (jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor),), drive="voltage")
-    times = jnp.linspace(0.0, 2.0, 1001)
-    run = jf.simulate(arm, Replayed(jnp.sin(4.0 * times)[:, None], 0.002), Step((0.0,), (0.0,)), times)
-    noise = 1e-4 * np.random.default_rng(0).normal(size=1001)
-    channels = {"voltage_1": np.asarray(run["voltage_1"]), "angle_1": np.asarray(run["angle_1"]) + noise}
-    found = make_problem(
-        jf.ArmFile(arm, {"default": 0.03}, None), [jf.Recording(np.asarray(times), channels, ())]
-    )
-    return Search(found.problem, found.calibration, print)
 
 
 @pytest.mark.parametrize("candidate, step", [(CABLE, (2e-3, 1e-3)), (OFFSET, (1e-3,))])

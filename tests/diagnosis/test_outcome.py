@@ -33,3 +33,8 @@ def test_what_is_explained_grows_with_the_horizon():
 def test_a_motion_that_was_lost_over_a_second_counts_as_over_the_shortest_horizon():
     explained = outcome(fitted(1e3), np.inf, 1.2).explained_over()
     assert set(explained.values()) == {4e3}
+
+
+def test_what_a_longer_horizon_leaves_bounds_what_a_shorter_one_does():
+    assert np.isclose(fitted(5e3, 1.2e3, 1.1e3).closest, 1.1)
+    assert np.isclose(fitted(1.1e3, 1.2e3, 5e3).closest, 1.1)

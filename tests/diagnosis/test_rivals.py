@@ -1,0 +1,27 @@
+"""Effects that are needed no more are dropped."""
+
+import dataclasses
+
+import numpy as np
+
+from jaxflex.diagnosis.catalogue import Candidate
+from jaxflex.diagnosis.hypothesis import CLOSE, Outcome, Search, adopt
+from jaxflex.diagnosis.rivals import prune
+
+DRAG = Candidate("quadratic_drag", "joint_1", ("coefficient",))
+OFFSET = Candidate("load_torque_bias", "joint_1", ("torque",))
+
+
+def test_an_effect_of_no_size_is_dropped_whatever_the_others_leave(search):
+    noise = 1e-3 * np.random.default_rng(1).normal(size=search.runs[0].reading.shape)
+    rough = [dataclasses.replace(run, reading=run.reading + noise, slopes=None) for run in search.runs]
+    search = Search(search.problem, rough, print)
+    nominal = search.climb((), search.parameters.start)
+    assert nominal.closest > CLOSE
+    outcome = Outcome(nominal, search.starts())
+    vector = adopt(search.parameters, nominal.fit.vector, OFFSET, (1e-3,))
+    outcome.final = dataclasses.replace(
+        nominal, effects=(DRAG, OFFSET), fit=dataclasses.replace(nominal.fit, vector=vector)
+    )
+    prune(search, outcome)
+    assert DRAG not in outcome.final.effects
