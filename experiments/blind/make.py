@@ -18,6 +18,7 @@ from .outside import CATALOGUE, OUTSIDE
 from .rigs import NOISE, RUNS, SAMPLES, UNITS, Rig, generator, true_rig
 from .simulator import CHANNELS, COUNT, SAMPLE
 from .sizes import COARSE, find_sizes, hide
+from .typical import TYPICAL
 
 FINE = 40  # steps a sample: 20 kHz
 COLOUR = 0.9  # correlation of coloured noise from one sample to the next
@@ -32,7 +33,7 @@ class Case:
       that begin with `outside:` are in no catalogue
     - `arm_toml`: the text of the nominal arm file
     - `runs`: a dict of columns a run, by header, such as `"angle_1 [rad]"`
-    - `gap`: `wanted`; `raw` and `projected` over the noise floor, by channel; `size`, the
+    - `gap`: `wanted`, None for a typical size; `raw` and `projected` over the noise floor, by channel; `size`, the
       projected gap in the channel where it is largest; `survival`; `reached`, false where
       no believable size of the effect gives the gap wanted
     """
@@ -51,12 +52,14 @@ def make_cases(
     seeds: list[int],
     noise: str = "white",
     also: tuple[str, ...] = (),
+    typical: bool = False,
 ) -> list[Case]:
     """Cases for every combination; `()` among the effects is nothing hidden, once a seed.
 
     In a case with several effects each has, alone, the gap asked for. A case whose control loop
     is unstable is left out, with a warning. `noise` is `"white"` or
     `"coloured"`; `also`: channels to log beside the usual, `"rate"` and `"strain"`.
+    `typical`: `gaps` are no gaps, but multiples of the sizes that such a rig has.
     """
     known = available(plant)
     for name in itertools.chain.from_iterable(effects):
@@ -66,7 +69,10 @@ def make_cases(
     keys = list(dict.fromkeys((e, s) for e, _, s in jobs))
     plain = dict(zip(keys, with_peaks([true_rig(plant, key, also) for key in keys]), strict=True))
     singles = list(dict.fromkeys(((e, s), name, g) for e, g, s in jobs for name in e))
-    sizes = find_sizes([(plain[key], key, name, g) for key, name, g in singles])
+    if typical:
+        sizes = [min(g * TYPICAL[name], known[name].most) for _, name, g in singles]
+    else:
+        sizes = find_sizes([(plain[key], key, name, g) for key, name, g in singles])
     size_of = dict(zip(singles, sizes, strict=True))
     rigs, truths = [], []
     for names, gap, seed in jobs:
@@ -88,8 +94,9 @@ def make_cases(
             continue
         title = "+".join(names).replace(":", "_") or "nothing"
         found = {
-            "wanted": gap, "raw": figures.raw, "projected": figures.projected, "size": figures.size,
-            "survival": figures.survival, "reached": bool(not names or figures.size > 0.7 * gap),
+            "wanted": None if typical else gap, "raw": figures.raw, "projected": figures.projected,
+            "size": figures.size, "survival": figures.survival,
+            "reached": bool(typical or not names or figures.size > 0.7 * gap),
         }  # fmt: skip
         draw = generator(plant, names, gap, seed, noise)
         runs = [
@@ -175,6 +182,9 @@ def main() -> None:
     parser.add_argument("--plant", default="single_link")
     parser.add_argument("--effects", default="all", help="all, outside, nothing, or names; a+b for a pair")
     parser.add_argument("--gaps", default="1,3,10", help="projected gap over the noise floor")
+    parser.add_argument(
+        "--typical", action="store_true", help="gaps are multiples of the sizes such a rig has"
+    )
     parser.add_argument("--seeds", type=int, default=3, help="how many")
     parser.add_argument("--first", type=int, default=0, help="the first of the seeds")
     parser.add_argument("--noise", default="white", choices=["white", "coloured"])
@@ -188,6 +198,7 @@ def main() -> None:
         list(range(given.first, given.first + given.seeds)),
         given.noise,
         tuple(filter(None, given.also.split(","))),
+        given.typical,
     )
     for case in cases:
         write_case(case, given.o / case.name)

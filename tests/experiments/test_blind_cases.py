@@ -10,6 +10,7 @@ from experiments.blind.make import make_cases, with_peaks, write_case
 from experiments.blind.outside import CATALOGUE
 from experiments.blind.rigs import NOISE, true_rig
 from experiments.blind.sizes import COARSE, hide
+from experiments.blind.typical import TYPICAL
 from jaxflex.files import arm_file, read_recording
 
 
@@ -58,3 +59,11 @@ def test_cases_are_as_asked(tmp_path):
     again = make_cases("single_link", [wanted[2]], [], [0], also=("rate", "strain"))[0]
     np.testing.assert_array_equal(again.runs[0]["current_1 [A]"], cases[2].runs[0]["current_1 [A]"])
     assert {"rate_1 [rad/s]", "strain_1 [1]"} <= set(again.runs[0])
+
+
+def test_typical_sizes_are_of_effects_that_can_be_hidden():
+    assert TYPICAL.keys() == EFFECTS.keys()
+    (case,) = make_cases("single_link", [("coulomb_friction",)], [0.5], [0], typical=True)
+    assert case.truth == (("coulomb_friction", "joint_1", {"torque": 0.5 * TYPICAL["coulomb_friction"]}),)
+    assert case.gap["wanted"] is None
+    assert case.gap["size"] > 100
