@@ -22,6 +22,7 @@ from .foretell import AT_FLOOR, Foretold, foretell
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
 from .locate import LatentForce, regimes
 from .next_experiment import advice
+from .parameters import EffectParameter
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem
 from .study import Study
@@ -30,6 +31,7 @@ VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
 OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
+COMPONENTS = {"along_y": "along_x", "along_x": "along_y", "sine": "cosine", "cosine": "sine"}  # of one size
 TIMING_ERRORS = {  # of a sample
     "input_delay": 0.05,  # a delayed command counts as its mean over each
     "sensor_lag": 0.3,  # a filter that works on samples lags by half of one more or less
@@ -146,11 +148,26 @@ def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
             estimates[column] = Estimate(size, size * part.spread * float(std), parameter_unit(part.name))
         else:
             part = parameters.effect[column - len(parameters.nominal)]
-            own = OWN_ERRORS.get(part.effect, OWN_ERROR) * value
-            late = TIMING_ERRORS.get(part.effect, 0.0) * search.problem.setting.sample_time
-            whole = float(np.sqrt(std**2 + own**2 + late**2))
+            whole = float(np.hypot(std, own_error(search.problem, found.vector, part)))
             estimates[column] = Estimate(float(value), whole, _unit(part.unit, part.location))
     return estimates
+
+
+def own_error(problem: Problem, vector: np.ndarray, part: EffectParameter) -> float:
+    """What a parameter of an effect may be wrong by without noise, in its unit: form, timing, the reading's zero."""
+    setting = problem.setting
+
+    def value(field: str) -> float:
+        return float(vector[setting.parameters.position(part.effect, part.location, field)])
+
+    own = OWN_ERRORS.get(part.effect, OWN_ERROR) * np.hypot(
+        value(part.field), value(COMPONENTS[part.field]) if part.field in COMPONENTS else 0.0
+    )
+    late = TIMING_ERRORS.get(part.effect, 0.0) * setting.sample_time
+    angle = f"angle_{part.location.rpartition('_')[2]}"
+    counted = part.field == "rest_angle" and angle in setting.channels
+    off = setting.noise[setting.channels.index(angle)] if counted else 0.0
+    return float(np.sqrt(own**2 + late**2 + off**2))
 
 
 def _unit(text: str, location: str) -> str:

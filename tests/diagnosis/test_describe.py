@@ -1,0 +1,31 @@
+"""What the parameters of an effect may be wrong by."""
+
+import pytest
+
+from jaxflex.diagnosis.catalogue import Candidate
+from jaxflex.diagnosis.describe import OWN_ERROR, own_error
+from jaxflex.diagnosis.hypothesis import adopt
+
+RIPPLE = Candidate("cogging_torque", "joint_1", ("sine", "cosine"), (("order", 6.0),))
+CABLE = Candidate("cable_stiffness", "joint_1", ("stiffness",), (("rest_angle", 0.0),), ("rest_angle",))
+
+
+def errors(search, candidate, step):
+    vector = adopt(search.parameters, search.parameters.start, candidate, step)
+    return {
+        part.field: own_error(search.problem, vector, part)
+        for part in search.parameters.effect
+        if (part.effect, part.location) == candidate.key
+    }
+
+
+def test_a_component_that_is_nothing_is_known_as_well_as_the_whole(search):
+    found = errors(search, RIPPLE, (0.0, 0.01))
+    assert found["sine"] == found["cosine"] == pytest.approx(OWN_ERROR * 0.01)
+
+
+def test_no_angle_is_known_better_than_it_is_read(search):
+    found = errors(search, CABLE, (0.05, 0.0))
+    assert found["stiffness"] == pytest.approx(OWN_ERROR * 0.05)
+    assert found["rest_angle"] == pytest.approx(search.problem.setting.noise[0])
+    assert found["rest_angle"] > 9e-5
