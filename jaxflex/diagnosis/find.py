@@ -16,6 +16,7 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
+    adopt,
     amplitudes_of,
     freedom,
 )
@@ -23,6 +24,7 @@ from .rivals import prune
 
 MOST_EFFECTS = 5
 SHORT_LIST = 3
+PAIR = 2  # of the short list that are tried two at a time
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
 WORSE = 1e-3  # misfit a reading by which a fit with one more effect is no fit
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
@@ -87,6 +89,14 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
                     confirmed.append((found.strength(fitted, explained), found, search.starts()))
 
         confirm(tried, before, before_starts)
+        if far and not any(
+            strength > STRONG and _worth_it(fitted, found) for strength, found, _ in confirmed
+        ):
+            # parameters bent by two effects may leave less than either of them does alone
+            for item in tried[:PAIR]:
+                first, first_starts = adopted(search, base, base_starts, item)
+                more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
+                confirm(_short_list(more)[:PAIR], first, first_starts)
         if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
             search.restart(base_starts)
             stated, stated_starts = straightened(search, base)
@@ -131,6 +141,13 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
     if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
         return True
     return best.fit.level < FAIR and not is_suspect(search.parameters, best)
+
+
+def adopted(search: Search, base: Hypothesis, starts: Starts, item: Ranked) -> tuple[Hypothesis, Starts]:
+    """`base` with the candidate as it was ranked, the starts settled and no parameter moved."""
+    search.restart(starts)
+    settled = search.settle(adopt(search.parameters, base.fit.vector, item.candidate, item.step))
+    return Hypothesis((*base.effects, item.candidate), settled, 1, {1: settled.cost}), search.starts()
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
