@@ -181,6 +181,15 @@ def test_recordings_of_an_unrelated_simulator(case, names):
     assert sorted(e.name for e in found.effects) == sorted(names)
 
 
+@pytest.mark.slow
+def test_two_large_effects_are_found_though_neither_helps_alone(tmp_path):
+    """Together they bend the stated parameters so far that these leave less than either effect does."""
+    pair = ("coulomb_friction", "cable_stiffness")
+    (case,) = make_cases("single_link", [pair], [1.0], [7], typical=True)
+    write_case(case, tmp_path)
+    assert sorted(e.name for e in answer(tmp_path).effects) == sorted(pair)
+
+
 def test_a_recording_without_its_input_is_refused():
     t = np.linspace(0, 2, 1001)
     recording = jf.Recording(t, {"angle_1": np.sin(t)}, ())
