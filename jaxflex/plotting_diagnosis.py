@@ -144,9 +144,9 @@ def plot_force(view: View, before: LatentForce, after: LatentForce) -> Figure:
         _cloud(axis, place, force.values, edges, colour, label)
     axis.set_xlim(edges[0], edges[-1])
     low, high = _spread(before.values, WILD)
-    lowest, highest = _spread(np.concatenate([before.values, after.values]), WILD)
+    lowest, highest = _spread(after.values, WILD)
     room = MOST * (high - low)  # an estimate that ran away must not hide the other
-    axis.set_ylim(max(lowest, low - room), min(highest, high + room))
+    axis.set_ylim(max(min(low, lowest), low - room), min(max(high, highest), high + room))
     axis.axhline(0.0, color="0.4", linewidth=0.6)
     axis.ticklabel_format(axis="y", scilimits=(-2, 4), useMathText=True)
     axis.set_xlabel(view.axis)

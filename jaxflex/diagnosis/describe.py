@@ -5,7 +5,6 @@
 
 import dataclasses
 import time
-from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,7 +18,7 @@ from .calibrate import fit
 from .catalogue import Candidate
 from .departure import departures, is_bent
 from .foretell import AT_FLOOR, Foretold, foretell
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart, without
 from .locate import LatentForce, regimes
 from .next_experiment import advice
 from .parameters import EffectParameter
@@ -38,27 +37,19 @@ TIMING_ERRORS = {  # of a sample
 }
 
 
-class Nominally(NamedTuple):
-    """What the arm as it was stated misses: the forces that it lacks, and how held-out runs were foretold."""
-
-    forces: list[LatentForce]
-    foretold: Foretold
-
-
-def nominally(study: Study) -> Nominally:
-    """What the calibrated arm without any effect misses."""
-    nominal = study.outcome.nominal
+def nominally(study: Study) -> Foretold:
+    """The held-out runs as the calibrated arm without any effect foretells them."""
     study.search.restart(study.outcome.nominal_starts)
-    forces = study.search.latent(nominal.fit.vector)
-    return Nominally(forces, foretell(study.prepared.problem, study.prepared.held_out, nominal))
+    return foretell(study.prepared.problem, study.prepared.held_out, study.outcome.nominal)
 
 
-def describe(study: Study, stated: Nominally, began: float) -> Diagnosis:
-    """The diagnosis that an outcome amounts to; `stated`: what the arm misses without it."""
+def describe(study: Study, before: Foretold, began: float) -> Diagnosis:
+    """The diagnosis that an outcome amounts to; `before`: the held-out runs as foretold without it."""
     search, outcome, parameters = study.search, study.outcome, study.search.parameters
-    before, after = stated.foretold, study.foretold()
+    after = study.foretold()
+    forces_before = lacking(search, outcome)
     search.restart(outcome.final_starts)
-    forces_after = search.latent(outcome.final.fit.vector)
+    forces_after = search.latent(outcome.final.fit.vector, outcome.final.horizon)
     gone = (before.level - after.level) / (before.level - 1) if before.level > VISIBLE else 0.0
     final = everything(study)
     estimates = _estimates(search, final)
@@ -76,7 +67,7 @@ def describe(study: Study, stated: Nominally, began: float) -> Diagnosis:
         verdict=verdict,
         effects=effects,
         alternatives=tuple(alternatives),
-        where=_where(before.misfits, stated.forces, outcome),
+        where=_where(before.misfits, forces_before, outcome),
         gap=Gap(
             "root mean square error of predictions over 1 s from estimated starts",
             True, before.errors, after.errors, study.prepared.floor,
@@ -87,10 +78,26 @@ def describe(study: Study, stated: Nominally, began: float) -> Diagnosis:
         explained=float(np.clip(gone, 0.0, 1.0)),
         notes=(*study.notes, *([_bent(search, final)] if bent else [])),
         seconds=time.perf_counter() - began,
-        forces_before=tuple(stated.forces),
+        forces_before=tuple(forces_before),
         forces_after=tuple(forces_after),
         comparison=_comparison(search.problem, before, after),
     )  # fmt: skip
+
+
+def lacking(search: Search, outcome: Outcome) -> list[LatentForce]:
+    """The forces that stand for what was found, the likeliest first.
+
+    Those that the calibrated arm lacks without it, along the motion that it explains. Where nothing was
+    found and much is left, the parameters are those stated: calibrated ones are bent by what is missing.
+    """
+    final, vector = outcome.final, outcome.final.fit.vector
+    search.restart(outcome.final_starts)
+    for effect in final.effects:
+        vector = without(search.parameters, vector, effect)
+    if not final.effects and final.fit.level > CLOSE:
+        vector = search.parameters.start
+        search.settle(vector)
+    return search.latent(vector, final.horizon)
 
 
 def everything(study: Study) -> Hypothesis:

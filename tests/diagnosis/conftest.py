@@ -1,5 +1,7 @@
 """A small problem to search."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -10,16 +12,28 @@ from jaxflex.diagnosis.hypothesis import Search
 from jaxflex.diagnosis.prepare import make_problem
 
 
+@pytest.fixture(scope="session")
+def swung():
+    """Gives the search in recordings of a bare axis that swings to and fro, with effects that its file lacks."""
+
+    def searched(*effects):
+        motor = jf.DCMotor(1.2, 0.06, 0.06)
+        joint = jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor)
+        arm = jf.Arm((), (joint,), drive="voltage")
+        times = jnp.linspace(0.0, 2.0, 1001)
+        pushes = Replayed(jnp.sin(4.0 * times)[:, None], 0.002)
+        true = dataclasses.replace(arm, effects=effects)
+        run = jf.simulate(true, pushes, Step((0.0,), (0.0,)), times)
+        noise = 1e-4 * np.random.default_rng(0).normal(size=1001)
+        channels = {"voltage_1": np.asarray(run["voltage_1"]), "angle_1": np.asarray(run["angle_1"]) + noise}
+        recording = jf.Recording(np.asarray(times), channels, ())
+        found = make_problem(jf.ArmFile(arm, {"default": 0.03}, None), [recording])
+        return Search(found.problem, found.calibration, print)
+
+    return searched
+
+
 @pytest.fixture(scope="module")
-def search():
+def search(swung):
     """A bare axis that swings to and fro for two seconds."""
-    motor = jf.DCMotor(1.2, 0.06, 0.06)
-    arm = jf.Arm((), (jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor),), drive="voltage")
-    times = jnp.linspace(0.0, 2.0, 1001)
-    run = jf.simulate(arm, Replayed(jnp.sin(4.0 * times)[:, None], 0.002), Step((0.0,), (0.0,)), times)
-    noise = 1e-4 * np.random.default_rng(0).normal(size=1001)
-    channels = {"voltage_1": np.asarray(run["voltage_1"]), "angle_1": np.asarray(run["angle_1"]) + noise}
-    found = make_problem(
-        jf.ArmFile(arm, {"default": 0.03}, None), [jf.Recording(np.asarray(times), channels, ())]
-    )
-    return Search(found.problem, found.calibration, print)
+    return swung()

@@ -1,10 +1,12 @@
-"""What the parameters of an effect may be wrong by."""
+"""What the parameters of an effect may be wrong by, and the force that stands for it."""
 
+import numpy as np
 import pytest
 
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.describe import OWN_ERROR, own_error
-from jaxflex.diagnosis.hypothesis import adopt
+from jaxflex.diagnosis.describe import OWN_ERROR, lacking, own_error
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome, adopt
+from jaxflex.effects import EFFECTS
 
 RIPPLE = Candidate("cogging_torque", "joint_1", ("sine", "cosine"), (("order", 6.0),))
 CABLE = Candidate("cable_stiffness", "joint_1", ("stiffness",), (("rest_angle", 0.0),), ("rest_angle",))
@@ -29,3 +31,16 @@ def test_no_angle_is_known_better_than_it_is_read(search):
     assert found["stiffness"] == pytest.approx(OWN_ERROR * 0.05)
     assert found["rest_angle"] == pytest.approx(search.problem.setting.noise[0])
     assert found["rest_angle"] > 9e-5
+
+
+def test_the_force_that_stands_for_a_cable_is_a_line_over_the_angle(swung):
+    stiffness = 0.05  # so much that the arm without it cannot be calibrated on what it did
+    search = swung(EFFECTS["cable_stiffness"](stiffness, rest_angle=0.0))
+    vector = adopt(search.parameters, search.parameters.start, CABLE, (stiffness, 0.0))
+    final = Hypothesis((CABLE,), search.settle(vector, HORIZONS[-1]), HORIZONS[-1], {})
+    outcome = Outcome(final, search.starts())
+    outcome.final, outcome.final_starts = final, search.starts()
+    force = next(force for force in lacking(search, outcome) if force.equation == "joint_1")
+    slope, offset = np.polyfit(force.angle, force.values, 1)
+    assert slope == pytest.approx(-stiffness, rel=0.05)
+    assert abs(offset) < 0.05 * np.abs(force.values).max()
