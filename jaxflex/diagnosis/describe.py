@@ -20,6 +20,7 @@ from .departure import departures, is_bent
 from .foretell import AT_FLOOR, Foretold, foretell
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart, without
 from .locate import LatentForce, regimes
+from .loose_joint import is_of_loose_joint
 from .next_experiment import advice
 from .parameters import EffectParameter
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
@@ -43,11 +44,14 @@ def nominally(study: Study) -> Foretold:
     return foretell(study.prepared.problem, study.prepared.held_out, study.outcome.nominal)
 
 
-def describe(study: Study, before: Foretold, began: float) -> Diagnosis:
-    """The diagnosis that an outcome amounts to; `before`: the held-out runs as foretold without it."""
+def describe(study: Study, first: Study, began: float) -> Diagnosis:
+    """The diagnosis that an outcome amounts to; `first`: of the arm as it was stated, which may be another."""
     search, outcome, parameters = study.search, study.outcome, study.search.parameters
-    after = study.foretold()
-    forces_before = lacking(search, outcome)
+    before, after = nominally(first), study.foretold()
+    # without what it does at its flanks, a joint that comes apart is pressed as hard as it was open
+    apart = any(is_of_loose_joint(parameters, effect) for effect in outcome.final.effects)
+    located = first if apart else study
+    forces_before = lacking(located.search, located.outcome)
     search.restart(outcome.final_starts)
     forces_after = search.latent(outcome.final.fit.vector, outcome.final.horizon)
     gone = (before.level - after.level) / (before.level - 1) if before.level > VISIBLE else 0.0

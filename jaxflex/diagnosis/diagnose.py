@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .departure import is_bent
-from .describe import describe, nominally
+from .describe import describe
 from .find import HALFWAY, find
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
@@ -48,7 +48,7 @@ def diagnose(
     if divided:
         say("the runs held out show what the others do not: the end of each is held out instead")
         chosen = study(divided)
-    stated = nominally(chosen)
+    first = chosen
 
     def gauged(chosen: Study) -> Study:
         final = chosen.outcome.final
@@ -82,7 +82,7 @@ def diagnose(
     for other_arm in likely:
         chosen = other_arm(chosen)
     weigh(chosen.search, chosen.outcome)
-    return describe(chosen, stated, began)
+    return describe(chosen, first, began)
 
 
 def _deflections(study: Study) -> list[str]:
