@@ -2,7 +2,10 @@
 
 import itertools
 
+import numpy as np
+
 from ..effects import EFFECTS
+from .catalogue import Candidate
 from .departure import is_suspect, straightens
 from .hypothesis import (
     CLOSE,
@@ -43,8 +46,7 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
     """
     say = search.say
     begin = search.starts()
-    settled = search.settle(search.parameters.start)
-    base, base_starts = Hypothesis((), settled, 1, {1: settled.cost}), search.starts()
+    base, base_starts = settled_at(search, (), search.parameters.start)
     outcome: Outcome | None = None
     levels: list[float] = []
     for _ in range(MOST_EFFECTS + 1):
@@ -146,16 +148,23 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
 def adopted(search: Search, base: Hypothesis, starts: Starts, item: Ranked) -> tuple[Hypothesis, Starts]:
     """`base` with the candidate as it was ranked, the starts settled and no parameter moved."""
     search.restart(starts)
-    settled = search.settle(adopt(search.parameters, base.fit.vector, item.candidate, item.step))
-    return Hypothesis((*base.effects, item.candidate), settled, 1, {1: settled.cost}), search.starts()
+    vector = adopt(search.parameters, base.fit.vector, item.candidate, item.step)
+    return settled_at(search, (*base.effects, item.candidate), vector)
+
+
+def settled_at(
+    search: Search, effects: tuple[Candidate, ...], vector: np.ndarray
+) -> tuple[Hypothesis, Starts]:
+    """These effects and parameters as they are, the starts alone settled."""
+    settled = search.settle(vector)
+    return Hypothesis(effects, settled, 1, {1: settled.cost}), search.starts()
 
 
 def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
     """The hypothesis with the nominal parameters where they were stated, the starts settled."""
     vector = base.fit.vector.copy()
     vector[: len(search.parameters.nominal)] = 0.0
-    settled = search.settle(vector)
-    return Hypothesis(base.effects, settled, 1, {1: settled.cost}), search.starts()
+    return settled_at(search, base.effects, vector)
 
 
 def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) -> list[Ranked]:
