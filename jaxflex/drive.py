@@ -113,12 +113,29 @@ def joint_effects(model: AssembledArm) -> tuple[AbstractJointEffect, ...]:
 
 
 def effect_torques(
-    effects: tuple[AbstractJointEffect, ...], angles: tuple, rates: tuple, time: Scalar
+    effects: tuple[AbstractJointEffect, ...],
+    angles: tuple,
+    rates: tuple,
+    time: Scalar,
+    memory: tuple | None = None,
 ) -> tuple[Scalar, ...]:
-    """Sum of `effects` on every joint [N m]."""
+    """Sum of `effects` on every joint [N m]; `memory` has an entry an effect, None where none remembers."""
     torques = [jnp.zeros_like(rate) for rate in rates]
-    for effect in effects:
-        torques[effect.index] = torques[effect.index] + effect(
-            angles[effect.index], rates[effect.index], time
-        )
+    for effect, kept in zip(effects, memory or (None,) * len(effects), strict=True):
+        i = effect.index
+        torques[i] = torques[i] + effect(angles[i], rates[i], time, kept)
     return tuple(torques)
+
+
+def initial_joint_memory(model: AssembledArm) -> tuple | None:
+    """Memory of the joint effects at the start, one entry an effect; None if none remembers anything."""
+    found = tuple(effect.initial() for effect in joint_effects(model))
+    return None if all(memory is None for memory in found) else found
+
+
+def joint_memory_rates(model: AssembledArm, rates: tuple, memory: tuple | None) -> tuple | None:
+    """Time derivative of the memory of the joint effects at the `rates` of the joints [rad/s]."""
+    if memory is None:
+        return None
+    pairs = zip(joint_effects(model), memory, strict=True)
+    return tuple(effect.memory_rate(rates[effect.index], kept) for effect, kept in pairs)

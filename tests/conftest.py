@@ -1,7 +1,8 @@
-"""Double precision for every test, a compilation cache off, and the data that is kept elsewhere."""
+"""Double precision for every test, compiled programs shared for a run, and the data that is kept elsewhere."""
 
 import gc
 import os
+import tempfile
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers side by side would fight for the cores
@@ -12,6 +13,16 @@ import pytest
 jax.config.update("jax_enable_x64", True)
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+def pytest_configure(config):
+    """What one worker of this run has compiled the others load; another run begins anew."""
+    if not hasattr(config, "workerinput"):
+        folder = tempfile.TemporaryDirectory(prefix="jaxflex-tests-", ignore_cleanup_errors=True)
+        os.environ["JAX_COMPILATION_CACHE_DIR"] = folder.name  # workers begin with it
+        config.add_cleanup(folder.cleanup)
+    jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -10,6 +10,7 @@ from controllers import OpenLoop, Step
 from jaxflex.effects import (
     EFFECTS,
     AbstractJointEffect,
+    AsymmetricFriction,
     Backlash,
     CableStiffness,
     CentrifugalStiffening,
@@ -208,6 +209,81 @@ def test_coulomb_friction_stops_an_axis_at_constant_deceleration():
     times = jnp.linspace(0.0, 0.4, 21)
     run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start)
     np.testing.assert_allclose(run["rate_1"], 1.0 - 2.0 * times, atol=1e-5)
+
+
+BRISTLE = CoulombFriction(0.2, 1e-6, presliding=2e-3)
+
+
+def test_a_bristle_bends_with_the_way_gone():
+    """`z = 1 - exp(-x / s)` from rest, whatever the speed (Dahl 1968)."""
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.1),), effects=(BRISTLE,))
+    start, times = jf.InitialState(rates=jnp.array([0.3])), jnp.linspace(0.0, 0.05, 21)
+    run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start)
+    assert run.state is not None and run.state.joint is not None
+    np.testing.assert_allclose(run.state.joint[0], 1 - np.exp(-run["angle_1"] / 2e-3), atol=2e-5)
+
+
+def test_a_bristle_holds_an_axis_as_a_spring_of_its_slope():
+    """Small motion at rest: `w = sqrt(T / (s I))`, `v_t / s` of damping (here none)."""
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.1),), effects=(BRISTLE,))
+    start, times = jf.InitialState(rates=jnp.array([1e-4])), jnp.linspace(0.0, 0.4, 101)
+    run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start)
+    w = np.sqrt(0.2 / 2e-3 / 0.1)
+    np.testing.assert_allclose(run["angle_1"], 1e-4 / w * np.sin(w * times), atol=3e-8)
+
+
+def test_a_bristle_takes_energy_over_a_cycle_and_loses_less_in_small_ones():
+    """Work of `-T z` along `x = a sin t`: close to `4 T a` where it slides, hardly any within the bristle."""
+    phases = jnp.linspace(0.0, 4 * np.pi, 40001)
+    lost = []
+    for size in (1e-4, 2e-3, 1.0):
+        rates = size * jnp.cos(phases)
+
+        def onward(z, rate):
+            step = phases[1] * BRISTLE.settling(rate)
+            towards = rate / BRISTLE.presliding / BRISTLE.settling(rate)
+            z = towards + (z - towards) * jnp.exp(-step)
+            return z, BRISTLE(rate, rate, rate, z) * rate
+
+        power = np.asarray(jax.lax.scan(onward, jnp.zeros(()), rates)[1])
+        lost.append(-power[20000:].sum() * float(phases[1]) / (4 * 0.2 * size))
+    assert 0 < lost[0] < 0.05 < lost[1] < 0.7 < lost[2] < 1
+    assert lost[2] > 0.99
+
+
+def stopped(torque, presliding, method=None):
+    """Angle of an axis that friction stops from 0.5 rad/s, and holds."""
+    effects = (CoulombFriction(torque, 0.01, presliding), AsymmetricFriction(0.05, 0.01, presliding))
+    arm = jf.Arm((), (jf.Joint(hub_inertia=0.1),), effects=effects)
+    start = jf.InitialState(rates=jnp.array([0.5]))
+    times = jnp.linspace(0.0, 0.3, 4)
+    return jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start, method=method)["angle_1"]
+
+
+def test_a_short_bristle_is_rigid_friction():
+    rigid = stopped(0.2, None)[-1]
+    far, near = (float(abs(stopped(0.2, s)[-1] - rigid)) for s in (4e-4, 1e-4))
+    assert near < 0.3 * far < 0.01 * float(rigid)
+
+
+def test_a_bristle_has_derivatives_in_both_modes():
+    fine = jf.Fixed(1e-3)
+    point = (jnp.asarray(0.2), jnp.asarray(1e-2))
+
+    def end(torque, presliding):
+        return stopped(torque, presliding, fine)[-1]
+
+    _, along = jax.jvp(end, point, (jnp.asarray(1.0), jnp.asarray(0.1)))
+    back = jax.grad(end, (0, 1))(*point)
+    up, down = (end(point[0] + h, point[1] + 0.1 * h) for h in (1e-4, -1e-4))
+    assert float(along) == pytest.approx(float(up - down) / 2e-4, rel=1e-4)
+    assert float(back[0] + 0.1 * back[1]) == pytest.approx(float(along), rel=1e-6)
+
+
+def test_implicit_steps_take_a_bristle_in():
+    """At steps three times as long as explicit ones could be at the start."""
+    found = stopped(0.2, 1e-3, jf.Fixed(6e-3, jf.LinearlyImplicit()))
+    np.testing.assert_allclose(found, stopped(0.2, 1e-3), rtol=2e-2)
 
 
 def test_cable_and_bias_at_rest():

@@ -18,6 +18,7 @@ SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by
 WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
+STEEPEST_OLD = 1e-2  # the same of slopes that were taken elsewhere, and can be taken anew
 
 
 @dataclass(frozen=True)
@@ -111,23 +112,25 @@ def fit(
     kept = None
     renew = False
     for iteration in range(most):
+        for run in runs:
+            problem.bend(run, vector)
         linears = [problem.linearise(run, vector, columns, fresh=renew) for run in runs]
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)
         before, promise, settled = kept[0], np.inf, False
-        while np.isfinite(before) and damping < STEEPEST:
+        steepest = STEEPEST if renew else STEEPEST_OLD
+        while np.isfinite(before) and damping < steepest:
             current, cost, shown = first, before, linears
             for chord in range(CHORDS):
                 _, pull, precision = freedom.prior(vector)
                 matrix, pull = current.matrix + np.diag(precision), current.vector + pull
                 matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
-                step = solve(matrix, pull) if columns else np.zeros(0)
+                step = bounded(matrix, pull, freedom.lowest - vector[columns])
                 if not np.isfinite(step).all():
                     cost = np.inf
                     break
                 if chord == 0:
                     promise = current.promise + float(pull @ step)
-                step = np.maximum(vector[columns] + step, freedom.lowest) - vector[columns]
                 here = [run.starts.copy() for run in runs]
                 problem.move_starts(current, step)
                 vector[columns] += step
@@ -159,16 +162,16 @@ def fit(
             damping = max(10 * damping, 1e-4)
             first = condensed(linears)
         restore(kept)
+        gain = before - kept[0]
+        if gain == 0:
+            damping = 0.0  # of slopes that did not hold
         if iteration < iterations and any([problem.mend(run, vector) for run in runs]):
             renew = True
             continue
-        gain = before - kept[0]
         small = tolerance * first.count
         held = settled and abs(promise - gain) < max(FAITHFUL * gain, small)
         if held or (renew and not np.isfinite(before)):
             break
-        if gain == 0:
-            damping = 0.0  # of slopes that did not hold
         if renew and (gain < small or (iteration + 1 >= iterations and gain < SLOW * before)):
             break
         renew = True
@@ -179,6 +182,23 @@ def fit(
         damping = 0.0
         normal = condensed(linears)
     return Fit(vector, freedom, kept[0], prior(vector), normal)
+
+
+def bounded(matrix: np.ndarray, pull: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """The step that solves `matrix step = pull` with no entry below `least`: those that would be stay there."""
+    step = np.zeros(len(pull))
+    free = np.ones(len(pull), dtype=bool)
+    while free.any():
+        rest = pull[free] - matrix[np.ix_(free, ~free)] @ least[~free]
+        step = np.where(free, 0.0, least)
+        step[free] = solve(matrix[np.ix_(free, free)], rest)
+        below = free & (step < least)
+        if not below.any():
+            break
+        free &= ~below
+    else:
+        step = least.copy()
+    return step
 
 
 def held_back(

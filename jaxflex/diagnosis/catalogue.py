@@ -17,14 +17,20 @@ import numpy as np
 
 from ..arm.arm import Arm
 from ..drive import has_current_state
-from ..effects import EFFECTS, AbstractEffect, AbstractJointEffect
+from ..effects import EFFECTS, AbstractDryFriction, AbstractEffect, AbstractJointEffect
 from ..files.arm_file import places
 from .parameters import Parameters
+from .plant import bristles
 from .shooting import Problem, Run
 
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.0  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
+BENDING_TIME = (
+    1e-4  # s at a joint's typical rate: how far dry friction bends before it slides, at a first guess
+)
+SIGN = 2e-6  # of a joint's typical rate: where the sign of friction changes, the bristle aside; it never rests there
+RIGID_SIGN = 2e-3  # the same of a law without a bristle, narrow enough to integrate
 LEAST_RISE = 0.05  # of friction towards rest, of its level: below it there is none
 SATURATION = (0.4, 0.55, 0.7, 0.8, 0.88, 0.95, 0.98)  # of the largest command
 COOLING = (0.0, 10.0)  # s
@@ -46,8 +52,8 @@ class Candidate:
 
     @property
     def count(self) -> int:
-        """Number of parameters that a fit may choose, the sharpness of friction left aside."""
-        return len(self.amplitudes) + sum(name != "transition_rate" for name in self.free)
+        """Number of parameters that a fit may choose, how friction changes its sign left aside."""
+        return len(self.amplitudes) + sum(name != "presliding" for name in self.free)
 
     @property
     def index(self) -> int:
@@ -86,16 +92,17 @@ def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
     return all(low <= value <= high for value in step[: len(candidate.amplitudes)])
 
 
-def template(arm: Arm, channels: tuple[str, ...], transition_rates: list[float]) -> list[AbstractEffect]:
-    """One absent effect of every kind at every place that this arm has."""
+def template(arm: Arm, channels: tuple[str, ...], rates: list[float]) -> list[AbstractEffect]:
+    """One absent effect of every kind at every place that this arm has; `rates` [rad/s] typical of its joints."""
     found = []
     for kind in EFFECTS.values():
         for location in places(kind, arm.links, arm.joints):
             if not _possible(kind.name, location, arm, channels):
                 continue
             options = {}
-            if "transition_rate" in kind.units:
-                options["transition_rate"] = transition_rates[index(location)]
+            if issubclass(kind, AbstractDryFriction):
+                rate = rates[index(location)]
+                options |= {"transition_rate": SIGN * rate, "presliding": BENDING_TIME * rate}
             found.append(kind(0.0, location=location, **options))
     return found
 
@@ -130,10 +137,8 @@ def candidates(
         if name == "stribeck_friction":
             for share in STRIBECK:
                 rate = share * max(motion.rms_rate(effect.index) for motion in motions)
-                shape = (("stribeck_rate", rate), ("transition_rate", float(effect.transition_rate)))
-                yield Candidate(
-                    name, location, ("torque", "level"), shape, ("stribeck_rate", "transition_rate")
-                )
+                shape = (("stribeck_rate", rate), ("presliding", float(effect.presliding)))
+                yield Candidate(name, location, ("torque", "level"), shape, ("stribeck_rate", "presliding"))
         elif name == "cogging_torque":
             for order in ORDERS:
                 if order * max(motion.range(effect.index) for motion in motions) < WAVES * 2 * np.pi:
@@ -158,8 +163,8 @@ def candidates(
         elif name == "cable_stiffness":
             yield Candidate(name, location, ("stiffness",), (("rest_angle", 0.0),), ("rest_angle",))
         elif name in ("coulomb_friction", "asymmetric_friction"):
-            shape = (("transition_rate", float(effect.transition_rate)),)
-            yield Candidate(name, location, ("torque",), shape, ("transition_rate",))
+            shape = (("presliding", float(effect.presliding)),)
+            yield Candidate(name, location, ("torque",), shape, ("presliding",))
         else:
             yield Candidate(name, location, (next(iter(effect.units)),))
 
@@ -190,6 +195,10 @@ class Motion:
     def rate(self, joint: int) -> np.ndarray:
         """Rate [rad/s] within each interval."""
         return self.between[..., self.model.size + joint]
+
+    def bend(self, joint: int) -> np.ndarray:
+        """How the bristle of dry friction is bent within each interval."""
+        return self.between[..., bristles(self.model).start + joint]
 
     def current(self, joint: int) -> np.ndarray:
         """Current [A] within each interval."""
@@ -247,8 +256,10 @@ class Motion:
                 options |= dict.fromkeys(candidate.amplitudes, 0.0) | {amplitude: 1.0}
                 effect = kind(location=candidate.location, **options)
                 angle, rate = self.angle(joint), self.rate(joint)
-                at = np.broadcast_to(self.time + self.dt / 2, angle.shape)
-                flat = jax.vmap(effect)(*(jnp.asarray(v.ravel()) for v in (angle, rate, at)))
+                given = [angle, rate, np.broadcast_to(self.time + self.dt / 2, angle.shape)]
+                if effect.initial() is not None:
+                    given.append(self.bend(joint))
+                flat = jax.vmap(effect)(*(jnp.asarray(v.ravel()) for v in given))
                 torque = np.asarray(flat).reshape(angle.shape)
                 column = blank.copy()
                 column[..., joints + joint] = torque.mean(0)

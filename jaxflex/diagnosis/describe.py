@@ -14,15 +14,16 @@ from ..effects import EFFECTS
 from ..effects.base import AbstractSensorEffect
 from ..files.units import parameter_unit
 from ..sensors import unit
+from .adopt import without
 from .calibrate import fit
-from .catalogue import Candidate
+from .catalogue import RIGID_SIGN, SIGN, Candidate
 from .departure import departures, is_bent
 from .foretell import AT_FLOOR, Foretold, foretell
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart, without
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
 from .locate import LatentForce, regimes
 from .loose_joint import is_of_loose_joint
 from .next_experiment import advice
-from .parameters import EffectParameter
+from .parameters import EffectParameter, Parameters
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem
 from .study import Study
@@ -31,6 +32,7 @@ VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
 OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
+PRESLIDING_ERROR = 0.3  # the same, of how far a bristle bends: none of its laws is the true one
 COMPONENTS = {"along_y": "along_x", "along_x": "along_y", "sine": "cosine", "cosine": "sine"}  # of one size
 TIMING_ERRORS = {  # of a sample
     "input_delay": 0.05,  # a delayed command counts as its mean over each
@@ -171,7 +173,8 @@ def own_error(problem: Problem, vector: np.ndarray, part: EffectParameter) -> fl
     def value(field: str) -> float:
         return float(vector[setting.parameters.position(part.effect, part.location, field)])
 
-    own = OWN_ERRORS.get(part.effect, OWN_ERROR) * np.hypot(
+    share = PRESLIDING_ERROR if part.field == "presliding" else OWN_ERRORS.get(part.effect, OWN_ERROR)
+    own = share * np.hypot(
         value(part.field), value(COMPONENTS[part.field]) if part.field in COMPONENTS else 0.0
     )
     late = TIMING_ERRORS.get(part.effect, 0.0) * setting.sample_time
@@ -192,11 +195,13 @@ def _named(
     search: Search, hypothesis: Hypothesis, effect: Candidate, gain: float, estimates: dict[int, Estimate]
 ) -> NamedEffect:
     found = {}
+    parameters = search.parameters
+    bends = bends_before_it_slides(parameters, hypothesis.fit.vector, effect)
     for name in (*effect.amplitudes, *effect.free):
-        if name != "transition_rate":
-            found[name] = estimates[search.parameters.position(*effect.key, name)]
+        if name != "presliding" or bends:
+            found[name] = estimates[parameters.position(*effect.key, name)]
     for name, value in effect.shape:
-        if name not in found and name != "transition_rate":
+        if name not in found and name != "presliding":
             found[name] = Estimate(float(value), 0.0, EFFECTS[effect.effect].units[name])
     worth = float(gain) if np.isfinite(gain) else float(hypothesis.fit.count)
     return NamedEffect(effect.effect, effect.location, found, worth, EFFECTS[effect.effect].looks_like)
@@ -233,6 +238,14 @@ def _next(verdict: str, search: Search, outcome: Outcome, forces: list[LatentFor
     return "Repeat the run with another payload: the same effect with the same size confirms it."
 
 
+def bends_before_it_slides(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> bool:
+    """True of a dry friction with a bristle longer than what it was begun with, which is as good as none."""
+    if "presliding" not in effect.free:
+        return False
+    place = parameters.position(*effect.key, "presliding")
+    return bool(vector[place] > parameters.start[place])
+
+
 def _improved(study: Study, vector: np.ndarray) -> Arm:
     """The calibrated arm with the effects that were found, and no absent ones."""
     parameters, nominal = study.search.parameters, study.file.arm
@@ -241,6 +254,8 @@ def _improved(study: Study, vector: np.ndarray) -> Arm:
     for effect in study.outcome.final.effects:
         kind = EFFECTS[effect.effect]
         values = {field: float(vector[parameters.position(*effect.key, field)]) for field in kind.units}
+        if "presliding" in values and not bends_before_it_slides(parameters, vector, effect):
+            values |= {"presliding": None, "transition_rate": values["transition_rate"] * RIGID_SIGN / SIGN}
         kept.append(kind(location=effect.location, **values))
     joints = []
     for own, given in zip(arm.joints, nominal.joints, strict=True):

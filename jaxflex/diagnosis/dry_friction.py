@@ -1,9 +1,10 @@
 """Dry friction over a step of the integration.
 
 It is too stiff for explicit steps, and jumps where implicit ones want a slope. But over a
-step all other forces are as good as constant, and then the rate under a friction that goes
-straight from one side to the other has a closed form: sliding on, coming to rest, sticking,
-breaking loose. The mean of the friction on the way acts in the step as a constant torque.
+step all other forces are as good as constant, and what is left are two unknowns, the rate
+and the bristle. Backward Euler in these is a quadratic equation, stable at any step and for
+any bristle, down to none (Moreau's time stepping); the step is cut where the joint turns.
+The mean of the friction on the way acts in the step as a constant torque.
 """
 
 import math
@@ -18,9 +19,11 @@ from ..drive import joint_effects
 from ..effects import AbstractDryFriction
 from ..scalars import Scalar
 
-PHASES = 3  # of a step: slide to rest, turn, slide the other way
+CUTS = 4  # of a step into equal parts, beside where the joint turns
+SPANS = CUTS + 2
 WIDTH = math.log(4)  # of a straight transition that loses as much as `tanh(rate)`
 TINY = 1e-30
+SHORTEST = 1e-9  # part of a step
 
 
 class Stepping(NamedTuple):
@@ -36,57 +39,106 @@ class Stepping(NamedTuple):
     lightness: Float[Array, " joints"]
 
 
-def flow(rate: Scalar, push: Scalar, friction: Scalar, width: Scalar) -> Scalar:
-    """`v(1)` of `v' = push - friction clip(v / width, -1, 1)` from `v(0) = rate`, in closed form."""
-    there = friction > TINY
-    friction = jnp.where(there, friction, 1.0)
-    balance = push * width / friction
+class Law(NamedTuple):
+    """Dry friction of a joint, `-(resistance + asymmetry z) z` [N m].
 
-    def phase(_, carry):
-        v, side, left = carry
-        # inside the transition: towards the balance, out where that lies outside
-        exits = jnp.sign(balance) * (jnp.abs(balance) > width)
-        ratio = (v - balance) / jnp.where(exits == 0, 1.0, exits * width - balance)
-        turn = width / friction
-        needs = jnp.where(exits == 0, jnp.inf, turn * jnp.log(jnp.where(exits == 0, 1.0, ratio)))
-        inside = jnp.minimum(needs, left)
-        turned = balance + (v - balance) * jnp.exp(-inside / turn)
-        # outside: straight, until the transition begins
-        slope = push - side * friction
-        returns = (side * slope < 0) & (side != 0)
-        wait = jnp.where(returns, (side * width - v) / jnp.where(returns, slope, 1.0), jnp.inf)
-        outside = jnp.minimum(wait, left)
-        out = side != 0
-        after = jnp.where(out, v + slope * outside, turned)
-        taken = jnp.where(out, outside, inside)
-        over = jnp.where(out, wait <= left, needs <= left)
-        return after, jnp.where(over, jnp.where(out, 0.0, exits), side), left - taken
+    `width` [rad/s] of the change of its sign, and the `presliding` [rad] of the bristle z.
+    """
 
-    side = jnp.sign(rate) * (jnp.abs(rate) > width)
-    end, _, _ = jax.lax.fori_loop(0, PHASES, phase, (rate, side, jnp.ones_like(rate)))
-    return jnp.where(there, end, rate + push)
+    resistance: Scalar
+    asymmetry: Scalar
+    width: Scalar
+    presliding: Scalar
+
+
+def law(model: AssembledArm, joint: int, speed: Scalar) -> Law:
+    """The dry friction of a joint [N m] around a `speed`: all effects there as one bristle.
+
+    Width and presliding are the means of theirs, by size.
+    """
+    own = [e for e in joint_effects(model) if isinstance(e, AbstractDryFriction) and e.index == joint]
+    zero = jnp.zeros_like(speed)
+    ahead, back = (sum((e.resistance(speed, s) for e in own), zero) for s in (1.0, -1.0))
+    sizes = [jnp.abs(e.resistance(zero, 1.0)) + TINY for e in own]
+    whole = sum(sizes, zero + TINY)
+    width = sum((s * e.transition_rate for s, e in zip(sizes, own, strict=True)), zero) / whole
+    bends = [zero if e.presliding is None else e.presliding for e in own]
+    presliding = sum((s * b for s, b in zip(sizes, bends, strict=True)), zero) / whole
+    return Law((ahead + back) / 2, (ahead - back) / 2, WIDTH * width + TINY, presliding)
+
+
+def span(
+    rate: Scalar,
+    bend: Scalar,
+    push: Scalar,
+    friction: Scalar,
+    length: Scalar,
+    width: Scalar,
+    presliding: Scalar,
+) -> tuple[Scalar, Scalar]:
+    """Rate and bristle after a span of `v' = push - friction z`, `s z' = v - max(|v|, width) z`."""
+    # (v - c)(s + l |v|) + f (s z + l v) = 0, c = v0 + l push, f = l friction
+    free, force = rate + length * push, length * friction
+    held = presliding + length * width
+    turning = (free * held - force * presliding * bend) / (held + length * force)
+    side = jnp.sign(turning)
+    b = presliding - length * side * free + length * force
+    c = presliding * (force * side * bend - side * free)
+    slides = jnp.abs(turning) > width
+    root = jnp.sqrt(jnp.where(slides, b * b - 4 * length * c, 1.0))
+    ahead = b > 0
+    quotient = jnp.where(ahead, -2 * c, root - b) / jnp.where(ahead, b + root, 2 * length)
+    end = jnp.where(slides, side * quotient, turning)
+    return end, (presliding * bend + length * end) / (presliding + length * jnp.maximum(jnp.abs(end), width))
+
+
+def flow(
+    rate: Scalar, bend: Scalar, push: Scalar, friction: Scalar, width: Scalar, presliding: Scalar
+) -> tuple[Scalar, Scalar]:
+    """Rate and bristle after a unit of time of `v' = push - friction z`, `s z' = v - max(|v|, width) z`."""
+
+    def onward(_, carry):
+        v, z, left = carry
+        length = jnp.minimum(left, 1 / CUTS)
+        slope = push - friction * z
+        turns = slope * v < 0
+        wait = jnp.where(turns, -v / jnp.where(turns, slope, 1.0), jnp.inf)
+        length = jnp.where((jnp.abs(v) > width) & (wait < length), wait, length)
+        length = jnp.maximum(length, SHORTEST)
+        v, z = span(v, z, push, friction, length, width, presliding)
+        return v, z, jnp.maximum(left - length, 0.0)
+
+    end, bend, _ = jax.lax.fori_loop(0, SPANS, onward, (rate, bend, jnp.ones_like(rate)))
+    return end, bend
 
 
 def dry_friction(
-    model: AssembledArm, stepping: Stepping, starts: tuple, ends: tuple, before: tuple, step: Scalar
-) -> tuple:
-    """Mean torque [N m] of the dry friction at every joint over a step.
+    model: AssembledArm,
+    stepping: Stepping,
+    starts: tuple,
+    ends: tuple,
+    bends: tuple,
+    before: tuple,
+    step: Scalar,
+) -> tuple[tuple, tuple]:
+    """Mean torque [N m] of the dry friction at every joint over a step, and how its bristles are bent then.
 
     `starts` and `ends`: rates about a step under the friction `before`, from which follows
-    what all else would have done.
+    what all else would have done; `bends` of the bristles as it begins.
     """
-    laws = [e for e in joint_effects(model) if isinstance(e, AbstractDryFriction)]
-    found = []
-    for joint, (start, end, old) in enumerate(zip(starts, ends, before, strict=True)):
+    found, bent = [], []
+    for joint, (start, end, bend, old) in enumerate(zip(starts, ends, bends, before, strict=True)):
         gain = step * stepping.lightness[joint]
-        own = [e for e in laws if e.index == joint]
-        speed = (jnp.abs(start) + jnp.abs(end)) / 2
-        ahead, back = (sum((e.resistance(speed, s) for e in own), jnp.zeros_like(end)) for s in (1.0, -1.0))
-        sizes = [jnp.abs(e.resistance(jnp.zeros_like(end), 1.0)) + TINY for e in own]
-        width = sum((s * e.transition_rate for s, e in zip(sizes, own, strict=True)), jnp.zeros_like(end))
-        width = WIDTH * width / sum(sizes, jnp.full_like(end, TINY)) + TINY
+        own = law(model, joint, (jnp.abs(start) + jnp.abs(end)) / 2)
         free = end - gain * old
-        push = free - start - gain * (ahead - back) / 2
-        after = flow(start, push, gain * (ahead + back) / 2, width)
+        size = own.resistance + own.asymmetry * bend
+        after, then = flow(start, bend, free - start, gain * size, own.width, own.presliding / step)
         found.append((after - free) / gain)
-    return tuple(found)
+        bent.append(then)
+    return tuple(found), tuple(bent)
+
+
+def friction_at(model: AssembledArm, rates: tuple, bends: tuple) -> tuple:
+    """Torque [N m] of the dry friction at every joint at an instant."""
+    laws = [law(model, joint, jnp.abs(rate)) for joint, rate in enumerate(rates)]
+    return tuple(-(own.resistance + own.asymmetry * z) * z for own, z in zip(laws, bends, strict=True))

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 
 from ..effects import EFFECTS
+from .adopt import amplitudes_of, with_candidate
 from .catalogue import Candidate
 from .departure import is_suspect, straightens
 from .hypothesis import (
@@ -19,8 +20,6 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
-    adopt,
-    amplitudes_of,
     freedom,
 )
 from .rivals import prune
@@ -148,8 +147,9 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
 def adopted(search: Search, base: Hypothesis, starts: Starts, item: Ranked) -> tuple[Hypothesis, Starts]:
     """`base` with the candidate as it was ranked, the starts settled and no parameter moved."""
     search.restart(starts)
-    vector = adopt(search.parameters, base.fit.vector, item.candidate, item.step)
-    return settled_at(search, (*base.effects, item.candidate), vector)
+    return settled_at(
+        search, *with_candidate(search.parameters, base.effects, base.fit.vector, item.candidate, item.step)
+    )
 
 
 def settled_at(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
+from .adopt import held_by, rise, risen, with_candidate
 from .calibrate import MOST, Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
@@ -37,6 +38,8 @@ FORM_IS_KNOWN = {
 }  # fmt: skip
 BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal parameters could be bent to imitate
+LEAST = 0.1  # of the value that a shape is begun with
+SHARPEST = 1e-3  # the same, of the way that friction bends over
 FARTHEST_REST = 2 * np.pi  # rad, of a cable
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
@@ -127,40 +130,10 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
             columns.append(parameters.position(*effect.key, name))
             precision.append(1 / (0.5 * value if value else 1.0) ** 2)
             centre.append(value)
-            lowest.append(0.1 * value if value else -np.inf)
+            least = SHARPEST if name == "presliding" else LEAST
+            lowest.append(least * value if value else -np.inf)
     far += [np.inf] * (len(columns) - count)
     return Freedom(tuple(columns), *(np.array(part) for part in (precision, centre, lowest, far)))
-
-
-def adopt(
-    parameters: Parameters, vector: np.ndarray, candidate: Candidate, step: tuple[float, ...]
-) -> np.ndarray:
-    """`vector` with the candidate in it, its amplitudes at `step`."""
-    vector = vector.copy()
-    for name, value in candidate.shape:
-        vector[parameters.position(*candidate.key, name)] = value
-    for name, value in zip(candidate.amplitudes, step, strict=False):
-        vector[parameters.position(*candidate.key, name)] = value
-    if candidate.effect == "cable_stiffness" and len(step) > 1:
-        vector[parameters.position(*candidate.key, "rest_angle")] = step[1] / step[0]
-    return vector
-
-
-def amplitudes_of(parameters: Parameters, vector: np.ndarray, candidate: Candidate) -> tuple[float, ...]:
-    """The step by which `adopt` makes a candidate as large as it is in `vector`."""
-    found = [float(vector[parameters.position(*candidate.key, name)]) for name in candidate.amplitudes]
-    if candidate.effect == "cable_stiffness":
-        found.append(found[0] * float(vector[parameters.position(*candidate.key, "rest_angle")]))
-    return tuple(found)
-
-
-def without(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> np.ndarray:
-    """`vector` with the effect absent again."""
-    vector = vector.copy()
-    for part in parameters.effect:
-        if (part.effect, part.location) == effect.key:
-            vector[parameters.position(*effect.key, part.field)] = part.value
-    return vector
 
 
 def starts_of(runs: list[Run]) -> Starts:
@@ -262,7 +235,11 @@ class Search:
             frequencies = [dict(instead.shape)["frequency"], *frequencies]
         motions = [Motion(self.problem, run, vector) for run in self.runs]
         taken = {effect.key for effect in effects if effect is not instead}
-        tried = [c for c in candidates(parameters, motions, frequencies) if c.key not in taken]
+        tried = [
+            rise(c) if taken & held_by(c) else c
+            for c in candidates(parameters, motions, frequencies)
+            if c.key not in taken
+        ]
         columns = list(free.columns)
         own = [] if instead is None else self._own_places(columns, instead)
         linears = [
@@ -286,12 +263,15 @@ class Search:
                 precision[own] = BARRED
                 pull = np.where(np.isin(np.arange(len(columns)), own), 0.0, pull)
             for score in scores(normal, precision, pull, len(columns), tried, linears[0][1]):
-                if score.survival < INVISIBLE or not plausible(score.candidate, score.step):
+                candidate, step = score.candidate, score.step
+                if taken & held_by(candidate):
+                    candidate, step = risen(parameters, vector, candidate, step)
+                if score.survival < INVISIBLE or not plausible(candidate, step):
                     continue
                 strength = score.gain / allowance(normal.count, horizon)
-                kept = best.get(score.candidate.key)
+                kept = best.get(candidate.key)
                 if kept is None or strength > kept.strength:
-                    best[score.candidate.key] = Ranked(score.candidate, score.step, score.gain, strength)
+                    best[candidate.key] = Ranked(candidate, step, score.gain, strength)
         return sorted(best.values(), key=lambda ranked: -ranked.strength)
 
     def parts(self, effects: tuple[Candidate, ...]) -> list[Ranked]:
@@ -355,8 +335,10 @@ class Search:
     ) -> Hypothesis:
         """The candidate added to `base` in full, fitted from `starts`; the rest as for `climb`."""
         self.restart(starts)
-        vector = adopt(self.parameters, base.fit.vector, ranked.candidate, ranked.step)
-        return self.climb((*base.effects, ranked.candidate), vector, ceiling, to, most=most)
+        effects, vector = with_candidate(
+            self.parameters, base.effects, base.fit.vector, ranked.candidate, ranked.step
+        )
+        return self.climb(effects, vector, ceiling, to, most=most)
 
 
 class Outcome:

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
+from .adopt import adopt
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .flanks import choose_flanks, press
-from .hypothesis import CLOSE, Hypothesis, Search, adopt, freedom
+from .hypothesis import CLOSE, Hypothesis, Search, freedom
 from .parameters import Parameters
 from .shooting import LOST_PIECE
 from .study import Study
@@ -76,7 +77,7 @@ def loose_joints(
                 break
         study, few, fitted, size = min(tried, key=lambda entry: entry[2].fit.cost)
         with_others = joined(few, fitted, other)
-        if with_others.closest < LESS * other.outcome.final.closest:
+        if with_others.closest < max(LESS * other.outcome.final.closest, GONE):
             found.append((study, best_from(study.search, fitted.effects[0], [size])[0]))
     return found
 

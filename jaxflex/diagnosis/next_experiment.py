@@ -9,8 +9,9 @@ import dataclasses
 
 import numpy as np
 
+from .adopt import amplitudes_of
 from .catalogue import Candidate, Motion
-from .hypothesis import HORIZONS, Hypothesis, Search, amplitudes_of, freedom
+from .hypothesis import HORIZONS, Hypothesis, Search, freedom
 from .screen import with_candidates
 from .shooting import Run
 

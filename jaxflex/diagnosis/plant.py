@@ -1,9 +1,10 @@
 """The arm between two samples, and a recording cut into short pieces of it.
 
-State x of a piece: coordinates, rates, currents, heat of the windings, and what each
-instrument shows (an instrument may lag). Every piece starts from a state of its own, so
-that all run side by side, none drifts away from what was measured, and one program
-serves every horizon: long runs are pieces joined end to end by linear algebra.
+State x of a piece: coordinates, rates, currents, heat of the windings, how the bristles of
+dry friction are bent, and what each instrument shows (an instrument may lag). Every piece
+starts from a state of its own, so that all run side by side, none drifts away from what was
+measured, and one program serves every horizon: long runs are pieces joined end to end by
+linear algebra.
 """
 
 # arrays of numpy go to JAX and come back, which its annotations do not foresee
@@ -26,7 +27,7 @@ from ..effects import AbstractDryFriction, WindingHeating
 from ..kept import kept
 from ..scalars import Scalar
 from ..sensors import read_channels
-from .dry_friction import Stepping, dry_friction
+from .dry_friction import Stepping, dry_friction, friction_at
 
 LIMIT = 1.2  # of |lambda| h of a Runge-Kutta substep
 
@@ -55,25 +56,29 @@ class Pieces(eqx.Module):
 
 
 class Response(NamedTuple):
-    """What pieces show, the state each ends in, those on the way, and the dry friction that acts there."""
+    """What pieces show, the state each ends in, and those on the way."""
 
     reading: Float[Array, "pieces samples channels"]
     end: Float[Array, "pieces states"]
     states: Float[Array, "pieces samples states"]
-    friction: Float[Array, "pieces samples joints"]
 
 
 def state_size(model: AssembledArm, channels: tuple[str, ...]) -> int:
     """Number of states of a piece."""
     currents = sum(has_current_state(model, i) for i in range(len(model.joints)))
-    return 2 * model.size + currents + len(model.joints) + len(channels)
+    return 2 * model.size + currents + 2 * len(model.joints) + len(channels)
+
+
+def bristles(model: AssembledArm) -> slice:
+    """Where in the state of a piece the bristles of dry friction are."""
+    first = state_size(model, ()) - len(model.joints)
+    return slice(first, first + len(model.joints))
 
 
 def _split(model: AssembledArm, x: tuple):
-    n, joints = model.size, len(model.joints)
-    currents = sum(has_current_state(model, i) for i in range(joints))
-    rest = 2 * n + currents
-    return x[:n], x[n : 2 * n], x[2 * n : rest], x[rest : rest + joints], x[rest + joints :]
+    n, joints, bent = model.size, len(model.joints), bristles(model)
+    warm = bent.start - joints
+    return x[:n], x[n : 2 * n], x[2 * n : warm], x[warm : bent.start], x[bent], x[bent.stop :]
 
 
 def _drives(model: AssembledArm, command: tuple, qd: tuple, currents: tuple, heat: tuple):
@@ -86,7 +91,7 @@ def _drives(model: AssembledArm, command: tuple, qd: tuple, currents: tuple, hea
 
 def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
     """Drives and accelerations at an instant, dry friction left to `force`."""
-    q, qd, currents, heat, _ = _split(model, x)
+    q, qd, currents, heat, _, _ = _split(model, x)
     drives = _drives(model, command, qd, currents, heat)
     angles, _ = model.split(q)
     rates, _ = model.split(qd)
@@ -101,24 +106,23 @@ def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tup
 
 @simplified
 def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple) -> tuple:
-    """`x'`, instruments left where they are; tuples of scalars, which a batch turns into vectors."""
-    _, qd, _, heat, shown = _split(model, x)
+    """`x'`, bristles and instruments left where they are; tuples of scalars, which a batch turns into vectors."""
+    _, qd, _, heat, bends, shown = _split(model, x)
     drives, qdd = _motion(model, t, x, command, force)
     warming = [jnp.zeros_like(t)] * len(model.joints)
     for effect in drive_effects(model):
         if isinstance(effect, WindingHeating):
             i = effect.index
             warming[i] = effect.rate(command[i], drives.current[i], model.joints[i].motor, heat[i])
-    return (*qd, *qdd, *drives.current_rate, *warming, *(jnp.zeros_like(y) for y in shown))
+    return (*qd, *qdd, *drives.current_rate, *warming, *(jnp.zeros_like(y) for y in (*bends, *shown)))
 
 
-def truth(
-    model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple, friction: tuple
-) -> tuple:
-    """What perfect instruments would show, under the dry friction of every joint."""
-    q, qd, currents, heat, _ = _split(model, x)
+def truth(model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple) -> tuple:
+    """What perfect instruments would show."""
+    q, qd, currents, heat, bends, _ = _split(model, x)
     if any(name.startswith("tip_acceleration") for name in channels):
-        elastic = (jnp.zeros_like(t),) * (model.size - len(friction))
+        elastic = (jnp.zeros_like(t),) * (model.size - len(bends))
+        friction = friction_at(model, model.split(qd)[0], bends)
         drives, qdd = _motion(model, t, x, command, (*friction, *elastic))
     else:
         drives, qdd = _drives(model, command, qd, currents, heat), None
@@ -132,16 +136,15 @@ def interval(
     sample_time: float,
     stepping: Stepping,
     x: tuple,
-    friction: tuple,
     command: tuple,
     force: tuple,
     t: Scalar,
-) -> tuple[tuple, tuple, tuple, tuple]:
+) -> tuple[tuple, tuple, tuple]:
     """From one sample to the next by classical Runge-Kutta steps; `x` without the instruments.
 
-    `friction`: dry friction before; `force`: on every coordinate beside all else, held.
+    `force`: on every coordinate beside all else, held.
 
-    **Returns** the state, the dry friction, and what perfect instruments show at both ends.
+    **Returns** the state, and what perfect instruments show at both ends.
     """
     h, joints = sample_time / stepping.substeps, len(model.joints)
 
@@ -163,23 +166,20 @@ def interval(
         (_, _, slope), _ = jax.lax.scan(stage, (y, zero, zero), weights)
         return moved(y, slope, h)
 
-    none = (jnp.zeros_like(t),) * joints
+    none, bent = (jnp.zeros_like(t),) * joints, bristles(model)
 
-    def substep(_, carry):
-        y, _ = carry
-
+    def substep(_, y):
         def again(_, carry):
-            _, _, agreed = carry
+            _, agreed = carry
             end = one_pass(y, agreed)
             starts, ends = (model.split(z[model.size : 2 * model.size])[0] for z in (y, end))
-            return end, agreed, dry_friction(model, stepping, starts, ends, agreed, h)
+            friction, bends = dry_friction(model, stepping, starts, ends, y[bent], agreed, h)
+            return (*end[: bent.start], *bends, *end[bent.stop :]), friction
 
-        end, dry, _ = jax.lax.fori_loop(0, stepping.passes, again, (y, none, none))
-        return end, dry
+        return jax.lax.fori_loop(0, stepping.passes, again, (y, none))[0]
 
-    before = truth(model, channels, t, x, command, friction)
-    y, dry = jax.lax.fori_loop(0, stepping.substeps, substep, (x, none))
-    return y, dry, before, truth(model, channels, t + sample_time, y, command, dry)
+    y = jax.lax.fori_loop(0, stepping.substeps, substep, x)
+    return y, truth(model, channels, t, x, command), truth(model, channels, t + sample_time, y, command)
 
 
 @kept
@@ -233,24 +233,21 @@ def respond(
         none = (jnp.zeros_like(time[0]),) * model.size
 
         def step(carry, inputs):
-            x, shown, friction = carry
+            x, shown = carry
             u, t = inputs
             reading = tuple(g * y + b + d * t for g, y, b, d in zip(gain, shown, bias, drift, strict=True))
-            y, dry, before, after = interval(
-                model, channels, pieces.sample_time, pieces.stepping, x, friction, u, none, t
-            )
+            y, before, after = interval(model, channels, pieces.sample_time, pieces.stepping, x, u, none, t)
             lagged = tuple(
                 a * s + (m - a) * b + (1 - m) * c
                 for a, s, m, b, c in zip(decay, shown, mean, before, after, strict=True)
             )
-            return (y, lagged, dry), (reading, (*x, *shown), friction)
+            return (y, lagged), (reading, (*x, *shown))
 
-        still = none[: len(model.joints)]
-        (x, shown, _), found = jax.lax.scan(
-            step, (tuple(start)[:-count], tuple(start)[-count:], still), (tuple(command.T), time)
+        (x, shown), found = jax.lax.scan(
+            step, (tuple(start)[:-count], tuple(start)[-count:]), (tuple(command.T), time)
         )
-        reading, states, friction = (jnp.stack(part, -1) for part in found)
-        return Response(reading, jnp.stack((*x, *shown)), states, friction)
+        reading, states = (jnp.stack(part, -1) for part in found)
+        return Response(reading, jnp.stack((*x, *shown)), states)
 
     return jax.vmap(one)(starts, pieces.command, pieces.time)
 
@@ -259,26 +256,23 @@ class Moments(NamedTuple):
     """Samples of a run, one after the other: the state there without the instruments, and what acts."""
 
     x: Float[Array, "moments moving"]
-    friction: Float[Array, "moments joints"]
     command: Float[Array, "moments joints"]
     time: Float[Array, " moments"]
 
 
 class Direction(NamedTuple):
-    """What is moved, None for what is not: leaves of the model, states, dry friction, commands, forces."""
+    """What is moved, None for what is not: leaves of the model, states, commands, forces."""
 
     model: Any = None
     x: Float[Array, "directions moving"] | None = None
-    friction: Float[Array, "directions joints"] | None = None
     command: Float[Array, "directions joints"] | None = None
     force: Float[Array, "directions coordinates"] | None = None
 
 
 class Interval(NamedTuple):
-    """After an interval: the state, the dry friction, and what perfect instruments show at both ends."""
+    """After an interval: the state, and what perfect instruments show at both ends."""
 
     x: Float[Array, "*more moments moving"]
-    friction: Float[Array, "*more moments joints"]
     before: Float[Array, "*more moments channels"]
     after: Float[Array, "*more moments channels"]
 
@@ -295,17 +289,16 @@ def interval_slopes(
     """The intervals that begin at `moments`, and their derivatives along each of `directions`, leading axis first."""
     arrays, static = eqx.partition(model, eqx.is_inexact_array)
 
-    def one(arrays, x, friction, command, force, t):
-        x, friction, command, force = (tuple(part) for part in (x, friction, command, force))
+    def one(arrays, x, command, force, t):
+        x, command, force = (tuple(part) for part in (x, command, force))
         moved = eqx.combine(arrays, static)
-        found = interval(moved, channels, sample_time, stepping, x, friction, command, force, t)
+        found = interval(moved, channels, sample_time, stepping, x, command, force, t)
         return Interval(*(jnp.stack(part) for part in found))
 
-    def run(arrays, x, friction, command, force):
-        over = (None, 0, 0, 0, None, 0)
-        return jax.vmap(one, over, 0)(arrays, x, friction, command, force, moments.time)
+    def run(arrays, x, command, force):
+        return jax.vmap(one, (None, 0, 0, None, 0), 0)(arrays, x, command, force, moments.time)
 
-    point = (arrays, moments.x, moments.friction, moments.command, jnp.zeros(model.size))
+    point = (arrays, moments.x, moments.command, jnp.zeros(model.size))
 
     def along(direction):
         many = tuple(

@@ -17,7 +17,7 @@ from ..files.recording import Recording, RecordingError
 from .catalogue import template
 from .noise import noise_floors
 from .parameters import Parameters
-from .plant import state_size, substeps_for
+from .plant import bristles, state_size, substeps_for
 from .shooting import Problem, Run, Setting
 
 OUTPUTS = ("angle", "rate", "current", "tip_deflection", "strain", "tip_acceleration")
@@ -26,6 +26,8 @@ SHORTEST_PIECE = 10  # samples
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
 SMALLEST_NOISE = 2e-4  # of a channel's spread: no model is better than that
 SAMPLES = 25_000  # of one recording that are used
+UNSEEN = 1e-6  # spread of what no reading tells: it stays as it is put
+SLOW = 0.02  # of a joint's typical rate: below it, which way a bristle is bent is a guess
 CALIBRATION = 0.6  # of a recording that is divided; the rest is held out
 
 
@@ -108,14 +110,13 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording], divided: bool =
         noise.append(max(floors[name].innovation, SMALLEST_NOISE * spread))
     colour = [np.array([1.0, *(-a for a in floors[name].ar)]) for name in outputs]
     length = max(round(PIECE / step), SHORTEST_PIECE)
-    effects = template(arm, outputs, _transition_rates(arm, pieces, step))
+    effects = template(arm, outputs, _typical_rates(arm, pieces, step))
     substeps = substeps_for(dataclasses.replace(arm, effects=()).assemble(), step)
     parameters = Parameters(file, effects)
     model = parameters.arm.assemble()
-    setting = Setting(
-        parameters, outputs, np.array(noise), colour, step, length,
-        substeps, np.full(state_size(model, outputs), 1e3),
-    )  # fmt: skip
+    spread = np.full(state_size(model, outputs), 1e3)
+    spread[bristles(model)] = UNSEEN
+    setting = Setting(parameters, outputs, np.array(noise), colour, step, length, substeps, spread)
     if len(pieces) > 1 and not divided:
         runs = [make_run(piece, inputs, setting) for piece in pieces]
         count = (len(runs) + 1) // 2
@@ -149,8 +150,8 @@ def make_run(recording: Recording, inputs: Sequence[str], setting: Setting, begi
     return Run(times, command, padded, valid, starts)
 
 
-def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:
-    """Rate [rad/s] over which friction changes sign: 2 % of what each joint typically turns at."""
+def _typical_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:
+    """What each joint typically turns at [rad/s]."""
     found = []
     for i in range(1, len(arm.joints) + 1):
         rates = [1.0]
@@ -161,7 +162,7 @@ def _transition_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[
                 window = max(1, round(0.02 / dt))
                 angle = piece[f"angle_{i}"]
                 rates.append(float(np.std((angle[window:] - angle[:-window]) / (window * dt))))
-        found.append(0.02 * float(np.mean(rates[1:] or rates)))
+        found.append(float(np.mean(rates[1:] or rates)))
     return found
 
 
@@ -214,5 +215,7 @@ def first_starts(setting: Setting, times: np.ndarray, reading: np.ndarray, comma
                 current = smooth(current, 0)[at]
             parts.append(current[:, None])
     parts.append(np.zeros((count, joints)))
+    typical = np.sqrt(np.mean(qd[:, :joints] ** 2, 0)) + 1e-300
+    parts.append(np.tanh(qd[:, :joints] / (SLOW * typical)))
     parts.append(reading[at])
     return np.concatenate(parts, 1)

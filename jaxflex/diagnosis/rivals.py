@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 
+from .adopt import amplitudes_of, without
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, STRONG, Outcome, Search, amplitudes_of, without
+from .hypothesis import CLOSE, STRONG, Outcome, Search
 from .loose_joint import is_of_loose_joint
 
 MOST = 2  # rivals of an effect that are tried

@@ -98,6 +98,8 @@ class Problem:
 
         effects = setting.parameters.effect
         self._moves_model = [True] * len(setting.parameters.nominal) + [e.index is not None for e in effects]
+        bent = len(setting.start_spread) - len(setting.channels)
+        self._bristles = slice(bent - len(setting.parameters.arm.joints), bent)
         self._model = eqx.filter_jit(assembled)
         self._tangents = eqx.filter_jit(jax.vmap(along, (None, 0)))
         self._delay = [
@@ -324,6 +326,15 @@ class Problem:
         better = (here > LOST_PIECE) & (there < here / LOST_PIECE)
         run.starts = np.where(better[:, None], ends, run.starts)
         return bool(better.any())
+
+    def bend(self, run: Run, vector: np.ndarray) -> None:
+        """Begin every piece with the bristles of dry friction as the piece before leaves them.
+
+        No reading sees them, and left free they would make up for friction that is missing.
+        """
+        if run.stride == 1 and self.setting.parameters.has_dry_friction(vector):
+            ends = self.predict(run, vector).end[:-1, self._bristles]
+            run.starts[1:, self._bristles] = np.where(np.isfinite(ends), np.clip(ends, -1, 1), 0.0)
 
     def join(self, run: Run, vector: np.ndarray) -> None:
         """Move every start to where the piece before ends, unless that fits clearly worse.

@@ -30,8 +30,8 @@ LANES = 8  # parameters whose slopes are taken side by side: one compiled progra
 class Steps:
     """Every interval of a run made linear: tables `(pieces, samples, outcomes, columns)`.
 
-    The outcomes of an interval are the state after it (with the dry friction, where an
-    instrument feels it), then what perfect instruments show before and after.
+    The outcomes of an interval are the state after it, then what perfect instruments show
+    before and after.
     """
 
     before: np.ndarray  # what perfect instruments show, (pieces, samples, channels)
@@ -62,23 +62,20 @@ class Intervals:
         self.model = model
         self.channels = channels
         self.pieces = pieces
-        self.feels_friction = any(name.startswith("tip_acceleration") for name in channels)
         self.shape = pieces.time.shape
         count = int(np.prod(self.shape))
         self.chunks = np.minimum(np.arange(-(-count // MOMENTS) * MOMENTS), count - 1).reshape(-1, MOMENTS)
         moving = response.states[..., : -len(channels)]
-        parts = (moving, response.friction, np.asarray(pieces.command), np.asarray(pieces.time))
+        parts = (moving, np.asarray(pieces.command), np.asarray(pieces.time))
         self.moments = Moments(*(part.reshape(count, *part.shape[2:]) for part in parts))
 
     def steps(self) -> Steps:
         """The intervals with their slopes by state and by what acts."""
-        moving, joints = self.moments.x.shape[1], self.moments.friction.shape[1]
-        sizes = (moving, joints if self.feels_friction else 0, joints, self.model.size)
-        x, friction, command, force = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
-        directions = Direction(None, x, friction if self.feels_friction else None, command, force)
-        [(found, table)] = self._tables([directions])
-        states = sizes[0] + sizes[1]
-        return Steps(found.before, found.after, table[..., :states], table[..., states:])
+        moving, joints = self.moments.x.shape[1], self.moments.command.shape[1]
+        sizes = (moving, joints, self.model.size)
+        x, command, force = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+        [(found, table)] = self._tables([Direction(None, x, command, force)])
+        return Steps(found.before, found.after, table[..., :moving], table[..., moving:])
 
     def by_parameters(self, tangents: list[Any]) -> list[np.ndarray]:
         """Slopes of the outcomes along groups of directions of the model's leaves."""
@@ -101,9 +98,8 @@ class Intervals:
     def _joined(self, chunks: list[list[np.ndarray]]) -> tuple[Interval, np.ndarray]:
         count = int(np.prod(self.shape))
         parts = list(zip(*chunks, strict=True))
-        point = [np.concatenate(part)[:count].reshape(*self.shape, -1) for part in parts[:4]]
-        x, friction, before, after = (np.concatenate(part, 1)[:, :count] for part in parts[4:])
-        outcomes = [x, friction, before, after] if self.feels_friction else [x, before, after]
+        point = [np.concatenate(part)[:count].reshape(*self.shape, -1) for part in parts[:3]]
+        outcomes = [np.concatenate(part, 1)[:, :count] for part in parts[3:]]
         table = np.ascontiguousarray(np.moveaxis(np.concatenate(outcomes, -1), 0, -1))
         return Interval(*point), table.reshape(*self.shape, *table.shape[1:])
 

@@ -50,10 +50,18 @@ class AbstractEffect(eqx.Module):
 
 
 class AbstractJointEffect(AbstractEffect):
-    """A torque that a joint feels beside its motor."""
+    """A torque that a joint feels beside its motor; most remember nothing."""
+
+    def initial(self) -> PyTree:
+        """Memory at the start, a pytree of scalars; None for an effect without."""
+        return None
+
+    def memory_rate(self, rate: Scalar, memory: PyTree) -> PyTree:
+        """Time derivative of the memory at a rate of the joint [rad/s]."""
+        return None
 
     @abstractmethod
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
         """Torque on the joint [N m] at its angle [rad], its rate [rad/s] and time [s]."""
 
 

@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from ..scalars import Scalar, scalar
 from .base import AbstractJointEffect
@@ -23,7 +24,7 @@ class CableStiffness(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_angle": "rad"}
     looks_like: ClassVar[str] = "a torque that falls along a straight line over the angle"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
         """`-k (angle - angle_0)` [N m]."""
         return -self.stiffness * (angle - self.rest_angle)
 
@@ -43,7 +44,7 @@ class CoggingTorque(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"sine": "N m", "cosine": "N m", "order": "1"}
     looks_like: ClassVar[str] = "a torque that waves several times a turn over the angle"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
         """`-(a sin(n angle) + b cos(n angle))` [N m]."""
         phase = self.order * angle
         return -(self.sine * jnp.sin(phase) + self.cosine * jnp.cos(phase))
@@ -59,7 +60,7 @@ class LoadTorqueBias(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"torque": "N m"}
     looks_like: ClassVar[str] = "a torque that is the same at every angle, speed and time"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
         """`-T_0` [N m]."""
         return -self.torque
 
@@ -79,7 +80,7 @@ class PeriodicDisturbance(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"sine": "N m", "cosine": "N m", "frequency": "Hz"}
     looks_like: ClassVar[str] = "a torque of one steady frequency, whatever the arm does"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
         """`a sin(2 pi f t) + b cos(2 pi f t)` [N m]."""
         phase = 2 * jnp.pi * self.frequency * time
         return self.sine * jnp.sin(phase) + self.cosine * jnp.cos(phase)

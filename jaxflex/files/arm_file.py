@@ -229,7 +229,10 @@ def _effect(fields: Fields, links: tuple, joints: tuple) -> AbstractEffect:
         if part.name == "location":
             continue
         required = part.default is dataclasses.MISSING
-        value = fields.number(part.name, None, "a number", lambda x: True, required)
+        if part.default is None:
+            value = fields.number(part.name)
+        else:
+            value = fields.number(part.name, None, "a number", lambda x: True, required)
         if value is not None:
             values[part.name] = value
     fields.finish()

@@ -18,7 +18,9 @@ from ..drive import (
     effect_torques,
     initial_currents,
     initial_drive_memory,
+    initial_joint_memory,
     joint_effects,
+    joint_memory_rates,
 )
 from ..dynamics.lagrange import accelerations
 from ..dynamics.simplify import simplified
@@ -31,7 +33,8 @@ class State(NamedTuple):
 
     `q` coordinates [rad], [m]; `qd` their rates; `current` [A] of the motors whose
     current is a state; `memory` of the controller; `held` command under sampled
-    control; `drive`: memory of the drive effects. What there is none of is None.
+    control; `drive` and `joint`: memory of the effects in the drives and at the joints. What
+    there is none of is None.
     """
 
     q: tuple
@@ -40,6 +43,7 @@ class State(NamedTuple):
     memory: PyTree
     held: tuple | None
     drive: tuple | None = None
+    joint: tuple | None = None
 
 
 class Plant(eqx.Module):
@@ -57,7 +61,8 @@ class Plant(eqx.Module):
         q = angles + (zero,) * (self.model.size - len(angles))
         held = None if self.sample_time is None else (zero,) * len(angles)
         currents, drives = initial_currents(self.model) or None, initial_drive_memory(self.model)
-        return self.begun(State(q, (zero,) * len(q), currents, None, held, drives))
+        joints = initial_joint_memory(self.model)
+        return self.begun(State(q, (zero,) * len(q), currents, None, held, drives, joints))
 
     def begun(self, state: State) -> State:
         """`state` with the memory that the controller starts with there."""
@@ -97,7 +102,7 @@ class Plant(eqx.Module):
         """`q''` of `M q'' + C q' + g + D q' = tau` (Ahmad et al. (27))."""
         angles, _ = self.model.split(state.q)
         rates, _ = self.model.split(state.qd)
-        extra = effect_torques(joint_effects(self.model), angles, rates, t)
+        extra = effect_torques(joint_effects(self.model), angles, rates, t, state.joint)
         torques = tuple(map(lambda a, b: a + b, drives.torque, extra))
         if self.disturbance is not None:
             torques = tuple(map(lambda a, b: a + b, torques, self.disturbance(t)))
@@ -121,7 +126,9 @@ class Plant(eqx.Module):
         if command is None and state.drive is not None:
             command = self.command(t, state)
         kept = drive_memory_rates(self.model, command or (), drives, state.drive)
-        return State(state.qd, qdd, drives.current_rate or None, memory, held, kept)
+        rates, _ = self.model.split(state.qd)
+        bent = joint_memory_rates(self.model, rates, state.joint)
+        return State(state.qd, qdd, drives.current_rate or None, memory, held, kept, bent)
 
     def sampled(self, t: Scalar, state: State) -> State:
         """The state just after a sample at `t`: command held anew, memory advanced one period."""

@@ -6,9 +6,9 @@ period. Their stiffness is known, though: K and D of the links are constants, an
 A W-method (Steihaug and Wolfbrandt 1979) is a Rosenbrock method that keeps its order
 whatever matrix stands in for the Jacobian. With
 
-    J = [[0, 1], [-M^-1 K, -M^-1 D]] for the arm, -R/L for the windings
+    J = [[0, 1], [-M^-1 K, -M^-1 D]] for the arm, -R/L for the windings, -|rate|/s for bristles
 
-K and D with the slopes of drives, controller and friction at each joint on their diagonal,
+of dry friction, K and D with the slopes of drives, controller and friction at each joint on their diagonal,
 a stage costs one right-hand side and one more solve of the size of M. The coefficients are
 those of ROS34PW2 (Rang and Angermann 2005): four stages, order 3, stiffly accurate.
 """
@@ -21,9 +21,11 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from ..arm.arm import AssembledArm
 from ..drive import effect_torques, has_current_state, joint_effects
 from ..dynamics.lagrange import inertia
 from ..dynamics.ldl import factorised, substitute
+from ..effects import AbstractDryFriction
 from ..scalars import Scalar, dot
 from .plant import Plant, State, derivative, within
 
@@ -81,6 +83,7 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
     inverse = [
         substitute(*factor, tuple(one * (i == j) for j in range(model.size))) for i in range(model.size)
     ]
+    settling = _settling(model, state)
     decays = tuple(
         joint.motor.resistance / joint.motor.inductance  # pyright: ignore
         for i, joint in enumerate(model.joints)
@@ -96,10 +99,11 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
         rates = tuple(_GAMMA * (v - g * dot(row, pull)) for v, row in zip(r.qd, inverse, strict=True))
         moved = tuple(_GAMMA * (x + h * v) for x, v in zip(r.q, rates, strict=True))
         rest = jtu.tree_map(lambda x: _GAMMA * x, r)
+        bent = jtu.tree_map(lambda x, d: x / (1 / _GAMMA + h * d), r.joint, settling)
         current = r.current and tuple(
             x / (1 / _GAMMA + h * d) for x, d in zip(r.current, decays, strict=True)
         )
-        return rest._replace(q=moved, qd=rates, current=current)
+        return rest._replace(q=moved, qd=rates, current=current, joint=bent)
 
     def combined(base: State, weights, stages: tuple[State, ...]) -> State:
         def add(x, *parts):
@@ -123,6 +127,17 @@ def rosenbrock_step(plant: Plant, t: Scalar, h: Scalar, seen: tuple, state: Stat
     return combined(state, tuple(_M * h), stages)
 
 
+def _settling(model: AssembledArm, state: State) -> tuple | None:
+    """How fast what the joint effects remember settles [1/s], as `state.joint`."""
+    rates, _ = model.split(state.qd)
+    return state.joint and tuple(
+        effect.settling(rates[effect.index])
+        if isinstance(effect, AbstractDryFriction) and kept is not None
+        else None
+        for effect, kept in zip(joint_effects(model), state.joint, strict=True)
+    )
+
+
 def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
     """How drives, controller and friction hold each joint, `-d torque / d angle`, and slow it, `- / d rate`."""
     joints = len(plant.model.joints)
@@ -130,7 +145,7 @@ def _joint_slopes(plant: Plant, t: Scalar, state: State) -> tuple[tuple, tuple]:
     def torque(i, angle, rate):
         q = (*state.q[:i], angle, *state.q[i + 1 :])
         qd = (*state.qd[:i], rate, *state.qd[i + 1 :])
-        felt = effect_torques(joint_effects(plant.model), q[:joints], qd[:joints], t)[i]
+        felt = effect_torques(joint_effects(plant.model), q[:joints], qd[:joints], t, state.joint)[i]
         return -plant.drives(t, state._replace(q=q, qd=qd)).torque[i] - felt
 
     pairs = [jax.grad(torque, (1, 2))(i, state.q[i], state.qd[i]) for i in range(joints)]

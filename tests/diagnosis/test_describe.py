@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.describe import OWN_ERROR, lacking, own_error
-from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome, adopt
+from jaxflex.diagnosis.describe import OWN_ERROR, bends_before_it_slides, lacking, own_error
+from jaxflex.diagnosis.find import find
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
 from jaxflex.effects import EFFECTS
 
 RIPPLE = Candidate("cogging_torque", "joint_1", ("sine", "cosine"), (("order", 6.0),))
@@ -44,3 +46,19 @@ def test_the_force_that_stands_for_a_cable_is_a_line_over_the_angle(swung):
     slope, offset = np.polyfit(force.angle, force.values, 1)
     assert slope == pytest.approx(-stiffness, rel=0.05)
     assert abs(offset) < 0.05 * np.abs(force.values).max()
+
+
+@pytest.mark.parametrize("presliding", [2e-3, None])
+def test_friction_that_bends_is_told_from_friction_that_does_not(swung, presliding):
+    search = swung(EFFECTS["coulomb_friction"](0.01, 1e-3, presliding))
+    found = find(search).final
+    (friction,) = found.effects
+    assert friction.effect == "coulomb_friction"
+    assert bends_before_it_slides(search.parameters, found.fit.vector, friction) is (presliding is not None)
+
+    def value(field):
+        return found.fit.vector[search.parameters.position(*friction.key, field)]
+
+    assert value("torque") == pytest.approx(0.01, rel=0.03)
+    if presliding:
+        assert value("presliding") == pytest.approx(presliding, rel=0.1)

@@ -38,7 +38,7 @@ def hidden(tmp_path_factory):
     return {(case.truth[0][0] if case.truth else "nothing"): (folder / case.name, case) for case in cases}
 
 
-@pytest.mark.parametrize("name", ["cable_stiffness", "sensor_lag"])
+@pytest.mark.parametrize("name", ["cable_stiffness", pytest.param("sensor_lag", marks=pytest.mark.slow)])
 def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
     folder, case = hidden[name]
     found = answer(folder)
@@ -101,6 +101,7 @@ def test_nothing_hidden_is_nothing_missing(hidden):
     assert found.verdict == "nothing_missing" and not found.effects
 
 
+@pytest.mark.slow
 def test_noise_with_colour_is_nothing_missing(tmp_path):
     (case,) = make_cases("single_link", [()], [0.0], [0], noise="coloured")
     write_case(case, tmp_path)

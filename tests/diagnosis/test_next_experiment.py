@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from jaxflex.diagnosis.adopt import adopt, amplitudes_of
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.hypothesis import Hypothesis, adopt, amplitudes_of
+from jaxflex.diagnosis.hypothesis import Hypothesis
 from jaxflex.diagnosis.next_experiment import MENU, separations
 
 CABLE = Candidate("cable_stiffness", "joint_1", ("stiffness",))

@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 
+from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.hypothesis import CLOSE, Outcome, Search, adopt
+from jaxflex.diagnosis.hypothesis import CLOSE, Outcome, Search
 from jaxflex.diagnosis.rivals import prune
 
 DRAG = Candidate("quadratic_drag", "joint_1", ("coefficient",))
