@@ -18,7 +18,6 @@ SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by
 WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
-STEEPEST_OLD = 1e-2  # the same of slopes that were taken elsewhere, and can be taken anew
 
 
 @dataclass(frozen=True)
@@ -118,8 +117,7 @@ def fit(
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)
         before, promise, settled = kept[0], np.inf, False
-        steepest = STEEPEST if renew else STEEPEST_OLD
-        while np.isfinite(before) and damping < steepest:
+        while np.isfinite(before) and damping < STEEPEST:
             current, cost, shown = first, before, linears
             for chord in range(CHORDS):
                 _, pull, precision = freedom.prior(vector)
