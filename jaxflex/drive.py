@@ -122,8 +122,8 @@ def effect_torques(
     """Sum of `effects` on every joint [N m]; `memory` has an entry an effect, None where none remembers."""
     torques = [jnp.zeros_like(rate) for rate in rates]
     for effect, kept in zip(effects, memory or (None,) * len(effects), strict=True):
-        i = effect.index
-        torques[i] = torques[i] + effect(angles[i], rates[i], time, kept)
+        i, remembered = effect.index, () if kept is None else (kept,)
+        torques[i] = torques[i] + effect(angles[i], rates[i], time, *remembered)
     return tuple(torques)
 
 

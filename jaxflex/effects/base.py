@@ -61,8 +61,11 @@ class AbstractJointEffect(AbstractEffect):
         return None
 
     @abstractmethod
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
-        """Torque on the joint [N m] at its angle [rad], its rate [rad/s] and time [s]."""
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
+        """Torque on the joint [N m] at its angle [rad], its rate [rad/s] and time [s].
+
+        One that remembers anything takes its `memory` as a fourth argument.
+        """
 
 
 class AbstractDriveEffect(AbstractEffect):

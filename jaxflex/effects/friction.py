@@ -150,6 +150,6 @@ class QuadraticDrag(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"coefficient": "N m s^2/rad^2"}
     looks_like: ClassVar[str] = "a torque against motion that is a straight line over speed times its size"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-c rate |rate|` [N m]."""
         return -self.coefficient * rate * jnp.abs(rate)

@@ -4,7 +4,6 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import PyTree
 
 from ..scalars import Scalar, scalar
 from .base import AbstractJointEffect
@@ -24,7 +23,7 @@ class CableStiffness(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"stiffness": "N m/rad", "rest_angle": "rad"}
     looks_like: ClassVar[str] = "a torque that falls along a straight line over the angle"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-k (angle - angle_0)` [N m]."""
         return -self.stiffness * (angle - self.rest_angle)
 
@@ -44,7 +43,7 @@ class CoggingTorque(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"sine": "N m", "cosine": "N m", "order": "1"}
     looks_like: ClassVar[str] = "a torque that waves several times a turn over the angle"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-(a sin(n angle) + b cos(n angle))` [N m]."""
         phase = self.order * angle
         return -(self.sine * jnp.sin(phase) + self.cosine * jnp.cos(phase))
@@ -60,7 +59,7 @@ class LoadTorqueBias(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"torque": "N m"}
     looks_like: ClassVar[str] = "a torque that is the same at every angle, speed and time"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`-T_0` [N m]."""
         return -self.torque
 
@@ -80,7 +79,7 @@ class PeriodicDisturbance(AbstractJointEffect):
     units: ClassVar[dict[str, str]] = {"sine": "N m", "cosine": "N m", "frequency": "Hz"}
     looks_like: ClassVar[str] = "a torque of one steady frequency, whatever the arm does"
 
-    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
+    def __call__(self, angle: Scalar, rate: Scalar, time: Scalar) -> Scalar:
         """`a sin(2 pi f t) + b cos(2 pi f t)` [N m]."""
         phase = 2 * jnp.pi * self.frequency * time
         return self.sine * jnp.sin(phase) + self.cosine * jnp.cos(phase)
