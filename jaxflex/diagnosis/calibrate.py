@@ -184,19 +184,15 @@ def fit(
 
 def bounded(matrix: np.ndarray, pull: np.ndarray, least: np.ndarray) -> np.ndarray:
     """The step that solves `matrix step = pull` with no entry below `least`: those that would be stay there."""
-    step = np.zeros(len(pull))
     free = np.ones(len(pull), dtype=bool)
-    while free.any():
+    while True:
         rest = pull[free] - matrix[np.ix_(free, ~free)] @ least[~free]
         step = np.where(free, 0.0, least)
         step[free] = solve(matrix[np.ix_(free, free)], rest)
         below = free & (step < least)
         if not below.any():
-            break
+            return step
         free &= ~below
-    else:
-        step = least.copy()
-    return step
 
 
 def held_back(

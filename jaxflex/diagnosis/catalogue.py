@@ -26,12 +26,11 @@ from .shooting import Problem, Run
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.0  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
-BENDING_TIME = (
-    1e-4  # s at a joint's typical rate: how far dry friction bends before it slides, at a first guess
-)
+BENDING_TIME = 1e-4  # s at a joint's typical rate: how far dry friction bends, at a first guess
 SIGN = 2e-6  # of a joint's typical rate: where the sign of friction changes, the bristle aside; it never rests there
 RIGID_SIGN = 2e-3  # the same of a law without a bristle, narrow enough to integrate
 LEAST_RISE = 0.05  # of friction towards rest, of its level: below it there is none
+MOST_RISE = 3.0  # the same: nothing sticks harder
 SATURATION = (0.4, 0.55, 0.7, 0.8, 0.88, 0.95, 0.98)  # of the largest command
 COOLING = (0.0, 10.0)  # s
 
@@ -85,8 +84,8 @@ def plausible(candidate: Candidate, step: tuple[float, ...]) -> bool:
     """False for a friction that pushes, a spring that drives away, a lag into the future."""
     if not candidate.amplitudes:
         return bool(0.3 < step[0] < 3.0)
-    if candidate.effect == "stribeck_friction" and step[0] < LEAST_RISE * step[1]:
-        return False  # which is Coulomb's
+    if candidate.effect == "stribeck_friction" and not LEAST_RISE * step[1] <= step[0] <= MOST_RISE * step[1]:
+        return False  # which is Coulomb's, or no friction at all where it matters
     anything = (-np.inf, np.inf) if candidate.effect in EITHER_SIGN else (0.0, np.inf)
     low, high = BOUNDS.get(candidate.effect, anything)
     return all(low <= value <= high for value in step[: len(candidate.amplitudes)])
