@@ -48,7 +48,7 @@ def test_the_force_that_stands_for_a_cable_is_a_line_over_the_angle(swung):
     assert abs(offset) < 0.05 * np.abs(force.values).max()
 
 
-@pytest.mark.parametrize("presliding", [2e-3, None])
+@pytest.mark.parametrize("presliding", [2e-3, pytest.param(None, marks=pytest.mark.slow)])
 def test_friction_that_bends_is_told_from_friction_that_does_not(swung, presliding):
     search = swung(EFFECTS["coulomb_friction"](0.01, 1e-3, presliding))
     found = find(search).final

@@ -79,7 +79,7 @@ def test_parameters_do_not_depend_on_what_was_foretold_before(hidden):
 @pytest.mark.parametrize(
     "name, where_it_shows",
     [
-        ("voltage_saturation", "in the second run alone"),
+        pytest.param("voltage_saturation", "in the second run alone", marks=pytest.mark.slow),
         pytest.param(
             "viscous_friction", "in how far the stated parameters would have to go", marks=pytest.mark.slow
         ),
@@ -111,6 +111,7 @@ def test_noise_with_colour_is_nothing_missing(tmp_path):
     assert found.gap.after["tip_deflection_1"] < 1.3 * found.gap.noise_floor["tip_deflection_1"]
 
 
+@pytest.mark.slow
 def test_a_deflection_that_a_gauge_stands_for_is_followed_as_one():
     """What a gauge shows of the second mode no start, parameter or effect can imitate."""
     arm = jf.foldager_link(0.02, modes=2)
