@@ -12,7 +12,9 @@ import pytest
 
 jax.config.update("jax_enable_x64", True)
 
-EMITTERS = "--xla_cpu_use_fusion_emitters=false"  # as in jaxflex.set_up: programs compile in two thirds of the time
+EMITTERS = (
+    "--xla_cpu_use_fusion_emitters=false"  # as in jaxflex.set_up: programs compile in two thirds of the time
+)
 if jax.__version_info__ < (0, 11):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {EMITTERS}".strip()
 

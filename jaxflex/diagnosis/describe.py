@@ -12,32 +12,22 @@ import numpy as np
 from ..arm.arm import Arm
 from ..effects import EFFECTS
 from ..effects.base import AbstractSensorEffect
-from ..files.units import parameter_unit
-from ..sensors import unit
 from .adopt import without
-from .calibrate import fit
 from .catalogue import RIGID_SIGN, SIGN, Candidate
 from .departure import departures, is_bent
+from .estimates import estimated
 from .foretell import AT_FLOOR, Foretold, foretell
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
+from .hypothesis import CLOSE, Hypothesis, Outcome, Search
 from .locate import LatentForce, regimes
 from .loose_joint import is_of_loose_joint
 from .next_experiment import advice
-from .parameters import EffectParameter, Parameters
+from .parameters import Parameters
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem
 from .study import Study
 
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
-OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
-OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
-PRESLIDING_ERROR = 0.3  # the same, of how far a bristle bends: none of its laws is the true one
-COMPONENTS = {"along_y": "along_x", "along_x": "along_y", "sine": "cosine", "cosine": "sine"}  # of one size
-TIMING_ERRORS = {  # of a sample
-    "input_delay": 0.05,  # a delayed command counts as its mean over each
-    "sensor_lag": 0.3,  # a filter that works on samples lags by half of one more or less
-}
 
 
 def nominally(study: Study) -> Foretold:
@@ -57,8 +47,8 @@ def describe(study: Study, first: Study, began: float) -> Diagnosis:
     search.restart(outcome.final_starts)
     forces_after = search.latent(outcome.final.fit.vector, outcome.final.horizon)
     gone = (before.level - after.level) / (before.level - 1) if before.level > VISIBLE else 0.0
-    final = everything(study)
-    estimates = _estimates(search, final)
+    final = study.everything()
+    estimates = estimated(search, final)
     effects = tuple(
         _named(search, final, effect, gain, estimates)
         for effect, gain in zip(outcome.final.effects, outcome.gains, strict=True)
@@ -66,7 +56,7 @@ def describe(study: Study, first: Study, began: float) -> Diagnosis:
     alternatives = []
     for place, rival in outcome.rivals:
         candidate = rival.effects[-1]
-        alternatives.append(_named(search, rival, candidate, outcome.gains[place], _estimates(search, rival)))
+        alternatives.append(_named(search, rival, candidate, outcome.gains[place], estimated(search, rival)))
     bent = is_bent(parameters, final, outcome.explained)
     verdict = "unexplained" if bent else _verdict(outcome, after.level, gone)
     return Diagnosis(
@@ -106,25 +96,6 @@ def lacking(search: Search, outcome: Outcome) -> list[LatentForce]:
     return search.latent(vector, final.horizon)
 
 
-def everything(study: Study) -> Hypothesis:
-    """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
-    prepared, search, final = study.prepared, study.search, study.outcome.final
-    if any(effect.effect == "periodic_disturbance" for effect in final.effects):
-        return final
-    # the longest horizon over which the model still follows: beyond it, parameters would
-    # be bent to make up for what it does not know
-    followed = [h for h, cost in final.costs.items() if cost < CLOSE * final.fit.count]
-    horizon = max(followed, default=HORIZONS[0])
-    runs = [*prepared.calibration, *prepared.held_out]
-    search.restart(study.outcome.final_starts)
-    restart(prepared.held_out, study.foretold().starts)
-    free = freedom(search.parameters, final.effects)
-    found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
-    if not found.level < max(CLOSE, 2 * final.fit.level) or not np.isfinite(found.normal.matrix).all():
-        return final  # a run held out cannot be followed
-    return Hypothesis(final.effects, found, horizon, {horizon: found.cost})
-
-
 def _verdict(outcome: Outcome, left: float, gone: float) -> str:
     if not outcome.final.effects:
         return "nothing_missing" if left < AT_FLOOR else "unexplained"
@@ -140,55 +111,6 @@ def _bent(search: Search, final: Hypothesis) -> str:
         f"the arm's own parameters had to leave their stated uncertainty to fit ({worst} standard deviations): "
         "what is missing is not what was named, or the uncertainty is larger than stated"
     )
-
-
-def _estimates(search: Search, hypothesis: Hypothesis) -> dict[int, Estimate]:
-    """Every parameter that was free, by its place in the vector."""
-    found, parameters = hypothesis.fit, search.parameters
-    matrix = found.normal.matrix + np.diag(found.freedom.prior(found.vector)[2])
-    scale = np.sqrt(np.clip(np.diag(matrix), 1e-300, None))
-    tidy = matrix / np.outer(scale, scale)
-    spread = np.full(len(matrix), np.inf)  # of a motion that was lost nothing is known
-    if np.isfinite(tidy).all():
-        inverse = np.linalg.pinv(tidy) / np.outer(scale, scale)
-        spread = np.sqrt(np.clip(np.diag(inverse), 0, None) * max(found.level, 1.0))
-    estimates = {}
-    for column, std in zip(found.freedom.columns, spread, strict=True):
-        value = found.vector[column]
-        if column < len(parameters.nominal):
-            part = parameters.nominal[column]
-            size = part.value * float(np.exp(part.spread * value))
-            estimates[column] = Estimate(size, size * part.spread * float(std), parameter_unit(part.name))
-        else:
-            part = parameters.effect[column - len(parameters.nominal)]
-            whole = float(np.hypot(std, own_error(search.problem, found.vector, part)))
-            estimates[column] = Estimate(float(value), whole, _unit(part.unit, part.location))
-    return estimates
-
-
-def own_error(problem: Problem, vector: np.ndarray, part: EffectParameter) -> float:
-    """What a parameter of an effect may be wrong by without noise, in its unit: form, timing, the reading's zero."""
-    setting = problem.setting
-
-    def value(field: str) -> float:
-        return float(vector[setting.parameters.position(part.effect, part.location, field)])
-
-    share = PRESLIDING_ERROR if part.field == "presliding" else OWN_ERRORS.get(part.effect, OWN_ERROR)
-    own = share * np.hypot(
-        value(part.field), value(COMPONENTS[part.field]) if part.field in COMPONENTS else 0.0
-    )
-    late = TIMING_ERRORS.get(part.effect, 0.0) * setting.sample_time
-    angle = f"angle_{part.location.rpartition('_')[2]}"
-    counted = part.field == "rest_angle" and angle in setting.channels
-    off = setting.noise[setting.channels.index(angle)] if counted else 0.0
-    return float(np.sqrt(own**2 + late**2 + off**2))
-
-
-def _unit(text: str, location: str) -> str:
-    if not text.startswith("of the channel"):
-        return text
-    own = unit(location)
-    return own if text == "of the channel" else f"{own}/s"
 
 
 def _named(

@@ -7,11 +7,12 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
+from .estimates import drop_unseen, estimated, is_seen
 from .find import HALFWAY, find
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
-from .loose_joint import LESS, loose_joints
+from .loose_joint import LESS, is_of_loose_joint, loose_joints
 from .result import Diagnosis
 from .rivals import weigh
 from .signs import righted
@@ -82,6 +83,7 @@ def diagnose(
     for other_arm in likely:
         chosen = other_arm(chosen)
     weigh(chosen.search, chosen.outcome)
+    drop_unseen(chosen)
     return describe(chosen, first, began)
 
 
@@ -108,4 +110,12 @@ def _solves(loose: Study, other: Study) -> bool:
     # of a bare axis the load is never seen, and its starts fit much that is something else
     seen = bool(loose.file.arm.links) or left < AT_FLOOR
     gone = left - 1 < SOLVED * (other.foretold().level - 1)
-    return gone and seen and loose.outcome.final.strength(other.outcome.final) > STRONG
+    if not (gone and seen and loose.outcome.final.strength(other.outcome.final) > STRONG):
+        return False
+    final = loose.everything()
+    found = estimated(loose.search, final)
+    return all(
+        is_seen(found, loose.search, effect)
+        for effect in final.effects
+        if is_of_loose_joint(loose.search.parameters, effect)
+    )

@@ -8,6 +8,7 @@ The mean of the friction on the way acts in the step as a constant torque.
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -40,31 +41,31 @@ class Stepping(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Dry friction of a joint, `-(resistance + asymmetry z) z` [N m].
+    """Dry friction of a joint, `-T(v, z) z` [N m]: its effects as one bristle z.
 
-    `width` [rad/s] of the change of its sign, and the `presliding` [rad] of the bristle z.
+    `width` [rad/s] of the change of its sign, and the `presliding` [rad] of the bristle, are the means
+    of theirs, by size.
     """
 
-    resistance: Scalar
-    asymmetry: Scalar
+    effects: tuple[AbstractDryFriction, ...]
     width: Scalar
     presliding: Scalar
 
+    def resistance(self, rate: Scalar, bend: Scalar) -> Scalar:
+        """T [N m]."""
+        return sum((e.resistance(jnp.abs(rate), bend) for e in self.effects), jnp.zeros_like(rate))
 
-def law(model: AssembledArm, joint: int, speed: Scalar) -> Law:
-    """The dry friction of a joint [N m] around a `speed`: all effects there as one bristle.
 
-    Width and presliding are the means of theirs, by size.
-    """
-    own = [e for e in joint_effects(model) if isinstance(e, AbstractDryFriction) and e.index == joint]
-    zero = jnp.zeros_like(speed)
-    ahead, back = (sum((e.resistance(speed, s) for e in own), zero) for s in (1.0, -1.0))
+def law(model: AssembledArm, joint: int) -> Law:
+    """The dry friction of a joint."""
+    own = tuple(e for e in joint_effects(model) if isinstance(e, AbstractDryFriction) and e.index == joint)
+    zero = jnp.zeros(())
     sizes = [jnp.abs(e.resistance(zero, 1.0)) + TINY for e in own]
     whole = sum(sizes, zero + TINY)
     width = sum((s * e.transition_rate for s, e in zip(sizes, own, strict=True)), zero) / whole
     bends = [zero if e.presliding is None else e.presliding for e in own]
     presliding = sum((s * b for s, b in zip(sizes, bends, strict=True)), zero) / whole
-    return Law((ahead + back) / 2, (ahead - back) / 2, WIDTH * width + TINY, presliding)
+    return Law(own, WIDTH * width + TINY, presliding)
 
 
 def span(
@@ -93,19 +94,29 @@ def span(
 
 
 def flow(
-    rate: Scalar, bend: Scalar, push: Scalar, friction: Scalar, width: Scalar, presliding: Scalar
+    rate: Scalar,
+    bend: Scalar,
+    push: Scalar,
+    friction: Callable[[Scalar, Scalar], Scalar],
+    width: Scalar,
+    presliding: Scalar,
 ) -> tuple[Scalar, Scalar]:
-    """Rate and bristle after a unit of time of `v' = push - friction z`, `s z' = v - max(|v|, width) z`."""
+    """Rate and bristle after a unit of time of `v' = push - T z`, `s z' = v - max(|v|, width) z`.
+
+    `friction` T of rate and bristle is taken at the rate halfway through each span, as its slope
+    at the beginning foretells it.
+    """
 
     def onward(_, carry):
         v, z, left = carry
         length = jnp.minimum(left, 1 / CUTS)
-        slope = push - friction * z
+        slope = push - friction(v, z) * z
         turns = slope * v < 0
         wait = jnp.where(turns, -v / jnp.where(turns, slope, 1.0), jnp.inf)
         length = jnp.where((jnp.abs(v) > width) & (wait < length), wait, length)
         length = jnp.maximum(length, SHORTEST)
-        v, z = span(v, z, push, friction, length, width, presliding)
+        halfway = friction(v + length / 2 * slope, z)
+        v, z = span(v, z, push, halfway, length, width, presliding)
         return v, z, jnp.maximum(left - length, 0.0)
 
     end, bend, _ = jax.lax.fori_loop(0, SPANS, onward, (rate, bend, jnp.ones_like(rate)))
@@ -129,10 +140,13 @@ def dry_friction(
     found, bent = [], []
     for joint, (start, end, bend, old) in enumerate(zip(starts, ends, bends, before, strict=True)):
         gain = step * stepping.lightness[joint]
-        own = law(model, joint, (jnp.abs(start) + jnp.abs(end)) / 2)
+        own = law(model, joint)
         free = end - gain * old
-        size = own.resistance + own.asymmetry * bend
-        after, then = flow(start, bend, free - start, gain * size, own.width, own.presliding / step)
+
+        def slowing(rate, bend, gain=gain, own=own):
+            return gain * own.resistance(rate, bend)
+
+        after, then = flow(start, bend, free - start, slowing, own.width, own.presliding / step)
         found.append((after - free) / gain)
         bent.append(then)
     return tuple(found), tuple(bent)
@@ -140,5 +154,5 @@ def dry_friction(
 
 def friction_at(model: AssembledArm, rates: tuple, bends: tuple) -> tuple:
     """Torque [N m] of the dry friction at every joint at an instant."""
-    laws = [law(model, joint, jnp.abs(rate)) for joint, rate in enumerate(rates)]
-    return tuple(-(own.resistance + own.asymmetry * z) * z for own, z in zip(laws, bends, strict=True))
+    laws = [law(model, joint) for joint in range(len(rates))]
+    return tuple(-own.resistance(v, z) * z for own, v, z in zip(laws, rates, bends, strict=True))

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from ..effects import EFFECTS
-from .adopt import amplitudes_of, with_candidate
+from .adopt import amplitudes_of, held_by, with_candidate
 from .catalogue import Candidate
 from .departure import is_suspect, straightens
 from .hypothesis import (
@@ -84,10 +84,10 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
 
         def confirm(items, before, before_starts, fitted=fitted, explained=explained, confirmed=confirmed):
             for item in items:
-                found = search.confirm(before, before_starts, item, fitted.horizon)
+                found, found_starts = confirmed_from(search, before, before_starts, item, fitted.horizon)
                 say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
                 if search.sensible(found):
-                    confirmed.append((found.strength(fitted, explained), found, search.starts()))
+                    confirmed.append((found.strength(fitted, explained), found, found_starts))
 
         confirm(tried, before, before_starts)
         if far and not any(
@@ -117,6 +117,24 @@ def find(search: Search, start: Hypothesis | None = None) -> Outcome:
     search.restart(outcome.final_starts)
     prune(search, outcome)
     return outcome
+
+
+def confirmed_from(
+    search: Search, before: Hypothesis, starts: Starts, item: Ranked, to: int
+) -> tuple[Hypothesis, Starts]:
+    """The candidate added to `before` in full, and where its pieces start.
+
+    One that takes the place of another is fitted from the stated parameters as well: what the other
+    bent them to is no good place to begin.
+    """
+    found, found_starts = search.confirm(before, starts, item, to), search.starts()
+    if before.fit.level > CLOSE and {effect.key for effect in before.effects} & held_by(item.candidate):
+        search.restart(starts)
+        stated, stated_starts = straightened(search, before)
+        other = search.confirm(stated, stated_starts, item, to)
+        if other.strength(found) > 0:
+            return other, search.starts()
+    return found, found_starts
 
 
 def nearly_as_good(

@@ -355,6 +355,12 @@ class Outcome:
         self.close: dict[tuple[str, str], list[Ranked]] = {}  # what did as well when an effect was added
         self.gains: list[float] = []
 
+    def drop(self, place: int, final: Hypothesis, starts: Starts) -> None:
+        """The effect at this place is no longer part of what was found, which is `final` without it."""
+        self.final, self.final_starts = final, starts
+        self.gains = [gain for at, gain in enumerate(self.gains) if at != place]
+        self.rivals = [(at - (at > place), rival) for at, rival in self.rivals if at != place]
+
     @property
     def explained(self) -> float:
         """Cost over the longest horizon that the effects account for, 0 if the motion was lost there."""

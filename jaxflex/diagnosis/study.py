@@ -2,10 +2,13 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
+from .calibrate import fit
 from .foretell import Foretold, foretell
-from .hypothesis import Hypothesis, Outcome, Search
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
 from .prepare import make_problem
 
 Say = Callable[[str], None]
@@ -25,6 +28,7 @@ class Study:
         self.search = Search(self.prepared.problem, self.prepared.calibration, say)
         self.notes = self.prepared.notes
         self._foretold: tuple[Hypothesis, Foretold] | None = None
+        self._everything: tuple[Hypothesis, Hypothesis] | None = None
 
     def foretold(self) -> Foretold:
         """The held-out runs, as what was found in the end predicts them."""
@@ -32,3 +36,27 @@ class Study:
         if self._foretold is None or self._foretold[0] is not final:
             self._foretold = final, foretell(self.prepared.problem, self.prepared.held_out, final)
         return self._foretold[1]
+
+    def everything(self) -> Hypothesis:
+        """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
+        final = self.outcome.final
+        if self._everything is None or self._everything[0] is not final:
+            self._everything = final, self._fitted_to_all(final)
+        return self._everything[1]
+
+    def _fitted_to_all(self, final: Hypothesis) -> Hypothesis:
+        if any(effect.effect == "periodic_disturbance" for effect in final.effects):
+            return final  # its phase is its own in every run
+        # the longest horizon over which the model still follows: beyond it, parameters would
+        # be bent to make up for what it does not know
+        followed = [h for h, cost in final.costs.items() if cost < CLOSE * final.fit.count]
+        horizon = max(followed, default=HORIZONS[0])
+        prepared, search = self.prepared, self.search
+        runs = [*prepared.calibration, *prepared.held_out]
+        search.restart(self.outcome.final_starts)
+        restart(prepared.held_out, self.foretold().starts)
+        free = freedom(search.parameters, final.effects)
+        found = fit(prepared.problem, runs, final.fit.vector, free, horizon, 3, fresh=True)
+        if not found.level < max(CLOSE, 2 * final.fit.level) or not np.isfinite(found.normal.matrix).all():
+            return final  # a run held out cannot be followed
+        return Hypothesis(final.effects, found, horizon, {horizon: found.cost})

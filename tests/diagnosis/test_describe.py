@@ -5,7 +5,8 @@ import pytest
 
 from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.describe import OWN_ERROR, bends_before_it_slides, lacking, own_error
+from jaxflex.diagnosis.describe import bends_before_it_slides, lacking
+from jaxflex.diagnosis.estimates import OWN_ERROR, own_error
 from jaxflex.diagnosis.find import find
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
 from jaxflex.effects import EFFECTS

@@ -42,9 +42,26 @@ def test_without_a_bristle_sliding_and_sticking_are_exact(rate, push, friction):
         expected = rate - np.sign(rate) * slowing
     else:
         expected = np.sign(push) * max(abs(push) - friction, 0.0) * (1 - rests)
-    given = (rate, np.sign(rate), push, friction, 1e-12, 0.0)
-    found = flow(*(jnp.asarray(float(x)) for x in given))[0]
-    assert float(found) == pytest.approx(expected, abs=1e-7)
+    found = slid(rate, push, lambda v, z: jnp.asarray(friction))
+    assert found == pytest.approx(expected, abs=1e-7)
+
+
+def slid(rate, push, friction):
+    """Rate after a unit of time of a joint that slides as it begins, without a bristle."""
+    start, side, push, width, none = (jnp.asarray(float(x)) for x in (rate, np.sign(rate), push, 1e-12, 0.0))
+    return float(flow(start, side, push, friction, width, none)[0])
+
+
+def test_friction_that_weakens_with_speed_is_followed_to_second_order():
+    """`v' = p - (f - b v)`: `v = (v0 + (p - f) / b) exp(b t) - (p - f) / b`."""
+    rate, push, friction, errors = 0.1, 1.1, 1.0, []
+    for weakening in (0.8, 0.4, 0.2):
+        steady = (push - friction) / weakening
+        exact = (rate + steady) * np.exp(weakening) - steady
+        errors.append(slid(rate, push, lambda v, z, b=weakening: friction - b * v) - exact)
+    # spans are of a set length: an error of first order in it would halve with the rate of growth
+    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 1.9).all()
+    assert abs(errors[-1]) < 1e-3 * exact
 
 
 def swing(effects, torque, time, step, start=0.0, bend=0.0):
