@@ -6,7 +6,7 @@ import numpy as np
 
 from .adopt import amplitudes_of, without
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, STRONG, Outcome, Search
+from .hypothesis import CLOSE, FAIR, STRONG, Hypothesis, Outcome, Search
 from .loose_joint import is_of_loose_joint
 
 MOST = 2  # rivals of an effect that are tried
@@ -67,7 +67,10 @@ def weigh(search: Search, outcome: Outcome) -> None:
             alike = final.strength(rival) < 1.0 or lost < HARDLY_MORE * left
             same = lost < TIE * worth and alike
             # another form of what is there would explain a little more, whatever is there
-            better = lost < 0 and rival.strength(final, outcome.explained_over()) > STRONG
+            better = lost < 0 and (
+                rival.strength(final, outcome.explained_over()) > STRONG
+                or (is_all_there_is(final, rival) and item.candidate.count <= effect.count)
+            )
             simpler = same and item.candidate.count < effect.count
             if (better or simpler) and not is_of_loose_joint(search.parameters, effect):
                 search.say(
@@ -83,3 +86,8 @@ def weigh(search: Search, outcome: Outcome) -> None:
             if same:
                 outcome.rivals.append((place, rival))
     search.restart(outcome.final_starts)
+
+
+def is_all_there_is(other: Hypothesis, rival: Hypothesis) -> bool:
+    """True if the rival leaves only noise where the other leaves more."""
+    return rival.fit.level < FAIR and other.fit.level > CLOSE

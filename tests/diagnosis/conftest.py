@@ -13,10 +13,22 @@ from jaxflex.diagnosis.prepare import make_problem
 
 
 @pytest.fixture(scope="session")
-def swung():
+def swung(recorded):
     """Gives the search in recordings of a bare axis that swings to and fro, with effects that its file lacks."""
 
     def searched(*effects):
+        file, recordings = recorded(*effects)
+        found = make_problem(file, recordings)
+        return Search(found.problem, found.calibration, print)
+
+    return searched
+
+
+@pytest.fixture(scope="session")
+def recorded():
+    """Gives the file of the axis, and what was recorded of it with effects that the file lacks."""
+
+    def record(*effects):
         motor = jf.DCMotor(1.2, 0.06, 0.06)
         joint = jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor)
         arm = jf.Arm((), (joint,), drive="voltage")
@@ -27,10 +39,9 @@ def swung():
         noise = 1e-4 * np.random.default_rng(0).normal(size=1001)
         channels = {"voltage_1": np.asarray(run["voltage_1"]), "angle_1": np.asarray(run["angle_1"]) + noise}
         recording = jf.Recording(np.asarray(times), channels, ())
-        found = make_problem(jf.ArmFile(arm, {"default": 0.03}, None), [recording])
-        return Search(found.problem, found.calibration, print)
+        return jf.ArmFile(arm, {"default": 0.03}, None), [recording]
 
-    return searched
+    return record
 
 
 @pytest.fixture(scope="module")

@@ -38,3 +38,12 @@ def test_a_motion_that_was_lost_over_a_second_counts_as_over_the_shortest_horizo
 def test_what_a_longer_horizon_leaves_bounds_what_a_shorter_one_does():
     assert np.isclose(fitted(5e3, 1.2e3, 1.1e3).closest, 1.1)
     assert np.isclose(fitted(1.1e3, 1.2e3, 5e3).closest, 1.1)
+
+
+def test_an_effect_that_is_dropped_takes_its_gain_and_its_rivals_along():
+    found, rival = outcome(fitted(1e3), 101.0, 1.2), fitted(2e3)
+    found.gains, found.rivals = [1.0, 2.0, 3.0], [(0, rival), (1, rival), (2, rival)]
+    found.drop(1, rival, [])
+    assert found.final is rival
+    assert found.gains == [1.0, 3.0]
+    assert [place for place, _ in found.rivals] == [0, 1]
