@@ -27,7 +27,7 @@ from .steps import LANES, Intervals, Point, Steps, along_pieces
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
 MOST_SUBSTEPS = 24  # in a sample, where a contact is stiff
-DRY_PASSES = 3  # of a substep of one joint, until dry friction and what it changes agree
+DRY_PASSES = 2  # of a substep of one joint: the second knows the friction that the first one found
 DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
 
 
@@ -128,7 +128,7 @@ class Problem:
             substeps = min(substeps_for(model, self.setting.sample_time), MOST_SUBSTEPS)
         return Stepping(
             jnp.asarray(max(substeps, DRY_SUBSTEPS) if dry else substeps),
-            # friction and what it changes agree after some, and so do joints that move one another
+            # joints that stick move one another until they agree
             jnp.asarray(DRY_PASSES + joints - 1 if dry else 1),
             jnp.asarray(parameters.lightness),
         )
