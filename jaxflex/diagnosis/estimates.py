@@ -75,9 +75,10 @@ def _unit(text: str, location: str) -> str:
 
 
 def is_seen(found: dict[int, Estimate], search: Search, effect: Candidate) -> bool:
-    """True of an effect with an amplitude larger than its standard deviation."""
+    """True of an effect with an amplitude larger than its standard deviation, or of which nothing is known."""
     amplitudes = [found[search.parameters.position(*effect.key, name)] for name in effect.amplitudes]
-    return not amplitudes or any(abs(part.value) > part.std for part in amplitudes)
+    known = all(np.isfinite(part.std) for part in amplitudes)
+    return not (amplitudes and known) or any(abs(part.value) > part.std for part in amplitudes)
 
 
 def drop_unseen(study: Study) -> None:

@@ -1,5 +1,7 @@
 """What is found has a size, or is not there."""
 
+import numpy as np
+
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.estimates import drop_unseen, is_seen
 from jaxflex.diagnosis.hypothesis import Outcome
@@ -15,11 +17,12 @@ RIPPLE = Candidate("cogging_torque", "joint_1", ("sine", "cosine"), (("order", 4
 def test_one_amplitude_beyond_its_deviation_is_enough(search):
     places = [search.parameters.position(*RIPPLE.key, name) for name in RIPPLE.amplitudes]
 
-    def sizes(sine, cosine):
-        return {k: Estimate(v, 1.0, "N m") for k, v in zip(places, (sine, cosine), strict=True)}
+    def sizes(sine, cosine, std=1.0):
+        return {k: Estimate(v, std, "N m") for k, v in zip(places, (sine, cosine), strict=True)}
 
     assert is_seen(sizes(0.1, -1.1), search, RIPPLE)
     assert not is_seen(sizes(0.9, -0.9), search, RIPPLE)
+    assert is_seen(sizes(0.9, -0.9, np.inf), search, RIPPLE)  # of a motion that was lost
 
 
 def test_effects_that_come_to_nothing_are_dropped_but_for_the_last(recorded):
