@@ -12,10 +12,9 @@ import pytest
 
 jax.config.update("jax_enable_x64", True)
 
-EMITTERS = (
-    "--xla_cpu_use_fusion_emitters=false"  # as in jaxflex.set_up: programs compile in two thirds of the time
-)
+# as in jaxflex.set_up, not imported from there: the types of what is imported here would go unchecked
 if jax.__version_info__ < (0, 11):
+    EMITTERS = "--xla_cpu_use_fusion_emitters=false"  # programs compile in two thirds of the time
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {EMITTERS}".strip()
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
