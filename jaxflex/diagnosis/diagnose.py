@@ -7,7 +7,7 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
-from .estimates import drop_unseen, estimated, is_seen
+from .estimates import drop_unseen, unseen
 from .find import HALFWAY, find
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
@@ -112,10 +112,4 @@ def _solves(loose: Study, other: Study) -> bool:
     gone = left - 1 < SOLVED * (other.foretold().level - 1)
     if not (gone and seen and loose.outcome.final.strength(other.outcome.final) > STRONG):
         return False
-    final = loose.everything()
-    found = estimated(loose.search, final)
-    return all(
-        is_seen(found, loose.search, effect)
-        for effect in final.effects
-        if is_of_loose_joint(loose.search.parameters, effect)
-    )
+    return not any(is_of_loose_joint(loose.search.parameters, effect) for effect in unseen(loose))

@@ -81,19 +81,21 @@ def is_seen(found: dict[int, Estimate], search: Search, effect: Candidate) -> bo
     return not (amplitudes and known) or any(abs(part.value) > part.std for part in amplitudes)
 
 
+def unseen(study: Study) -> list[Candidate]:
+    """What was found that comes to nothing in all recordings together."""
+    final = study.everything()
+    found = estimated(study.search, final)
+    return [effect for effect in final.effects if not is_seen(found, study.search, effect)]
+
+
 def drop_unseen(study: Study) -> None:
-    """Take out of what was found the effects that come to nothing in all recordings together, one at a time."""
+    """Take out of what was found the effects that come to nothing, the last first; one is kept."""
     search, outcome = study.search, study.outcome
-    while len(outcome.final.effects) > 1:
-        final = study.everything()
-        found = estimated(search, final)
-        unseen = [place for place, effect in enumerate(final.effects) if not is_seen(found, search, effect)]
-        if not unseen:
-            return
-        place = unseen[-1]
-        effect = outcome.final.effects[place]
+    while len(outcome.final.effects) > 1 and (nothing := unseen(study)):
+        effect = nothing[-1]
         search.say(f"{effect.effect} at {effect.location} comes to nothing in all recordings together")
         search.restart(outcome.final_starts)
         vector = without(search.parameters, outcome.final.fit.vector, effect)
-        rest = tuple(e for e in outcome.final.effects if e is not effect)
+        place = outcome.final.effects.index(effect)
+        rest = (*outcome.final.effects[:place], *outcome.final.effects[place + 1 :])
         outcome.drop(place, search.climb(rest, vector, to=outcome.final.horizon), search.starts())
