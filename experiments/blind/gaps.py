@@ -4,8 +4,8 @@ The gap of a recording is what the same plant without the effect would read unde
 voltage, against what was read, over the noise. It is taken in segments of 1 s. *Raw*: each
 segment starts in the state that the recorded plant had. *Projected*: the best fit (three Gauss-Newton steps) of
 every segment's initial state and of the nominal parameters has been taken out: prior-weighted,
-and moving the parameters no further than REACH standard deviations in all, since a calibration
-that needs more has found that a nominal value is wrong. Their ratio is the survival of the effect.
+and with parameters no further from their nominal values, in all, than one arm in RARE is, since a
+calibration that needs more has found that a nominal value is wrong. Their ratio is the survival of the effect.
 """
 
 import dataclasses
@@ -14,13 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.optimize
+import scipy.stats
 
 from .drive import record, replay, segments, starts
 from .rigs import NOISE, Rig
 from .sensitivities import sensitivities
 from .simulator import CHANNELS
 
-REACH = 3.0
+RARE = 1000
 PASSES = 3  # of Gauss-Newton
 PROBE = 1e-4  # step of a parameter's logarithm, for the derivative by it
 
@@ -115,18 +116,26 @@ def project(rig: Rig, residual: np.ndarray, voltage: np.ndarray, start: np.ndarr
     slopes = np.moveaxis((motion[1:] - motion[0]) / PROBE, 0, -1)  # segments, size, parameters
     target = remainder(np.moveaxis(residual, -1, 0).reshape(*slopes.shape[:2], 1))
     columns = remainder(slopes).reshape(-1, len(prior))
-    unmoved = target.reshape(-1) + columns @ change
-    change = prior * bounded_fit(columns * prior, unmoved)
-    rest = (unmoved - columns @ change).reshape(residual.shape[-1], *residual.shape[:2])
-    return np.moveaxis(rest, 0, -1), change
+    here = off(rig)
+    at_nominal = target.reshape(-1) + columns @ here
+    there = prior * bounded_fit(columns * prior, at_nominal)
+    rest = (at_nominal - columns @ there).reshape(residual.shape[-1], *residual.shape[:2])
+    return np.moveaxis(rest, 0, -1), change + there - here
+
+
+def off(rig: Rig) -> np.ndarray:
+    """How far [log] the parameters of a rig are from their nominal values."""
+    nominal = rig.nominal
+    return np.array([np.log(rig.body[name][j] / nominal.body[name][j]) for name, j in nominal.uncertainty])
 
 
 def bounded_fit(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """`d` that makes `|target - columns d|^2 + m |d|^2` least, m = 1 or what keeps |d| to REACH."""
+    """`d` that makes `|target - columns d|^2 + m |d|^2` least, m = 1 or what keeps |d| to what arms reach."""
+    reach = scipy.stats.chi(columns.shape[1]).isf(1 / RARE)
     values, vectors = np.linalg.eigh(columns.T @ columns)
     along = vectors.T @ (columns.T @ target)
     answer = along / (values + 1)
-    if np.linalg.norm(answer) > REACH:
-        excess = lambda m: np.linalg.norm(along / (values + np.exp(m))) - REACH  # noqa: E731
+    if np.linalg.norm(answer) > reach:
+        excess = lambda m: np.linalg.norm(along / (values + np.exp(m))) - reach  # noqa: E731
         answer = along / (values + np.exp(scipy.optimize.brentq(excess, 0.0, 80.0)))
     return vectors @ answer

@@ -13,6 +13,7 @@ from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
 from .loose_joint import LESS, is_of_loose_joint, loose_joints
+from .prepare import HeldOut
 from .result import Diagnosis
 from .rivals import weigh
 from .signs import righted
@@ -28,8 +29,8 @@ def diagnose(
 
     Nominal parameters are calibrated within the uncertainty that the file states. Half of
     the recordings (the last 40 % of a single one) are held out to judge by; where those show
-    what the others do not, the last 40 % of each instead. `say` is told of the progress, a
-    line at a time.
+    what the others do not, the last 40 % of each instead, or the first. `say` is told of the
+    progress, a line at a time.
 
     **Returns** a `Diagnosis` with one of four verdicts.
 
@@ -39,16 +40,19 @@ def diagnose(
     say = say or (lambda line: None)
     recordings = righted(file, recordings)
 
-    def study(divided: bool) -> Study:
-        begun = Study(file, recordings, divided, say)
+    def study(held_out: HeldOut) -> Study:
+        begun = Study(file, recordings, held_out, say)
         begun.outcome = find(begun.search)
         return begun
 
-    chosen = study(divided=False)
-    divided = len(recordings) > 1 and chosen.outcome.level < FAIR and chosen.foretold().level > AT_FLOOR
-    if divided:
-        say("the runs held out show what the others do not: the end of each is held out instead")
-        chosen = study(divided)
+    chosen = study(HeldOut.RUNS if len(recordings) > 1 else HeldOut.ENDS)
+    for held_out in (HeldOut.ENDS, HeldOut.BEGINNINGS):
+        if held_out is chosen.held_out or not _has_not_seen(chosen):
+            continue
+        say(f"what is held out shows what the rest does not: {held_out.value} are held out instead")
+        other = study(held_out)
+        if other.foretold().level < chosen.foretold().level:
+            chosen = other
     first = chosen
 
     def gauged(chosen: Study) -> Study:
@@ -57,7 +61,7 @@ def diagnose(
         if other_file is None:
             return chosen
         say("the deflections may be those that a strain gauge stands for")
-        other = Study(other_file, recordings, divided, say)
+        other = Study(other_file, recordings, chosen.held_out, say)
         with_gauge = other.search.thinned().climb(final.effects, final.fit.vector, to=HORIZONS[0])
         if not with_gauge.closest < LESS * final.closest:
             return chosen
@@ -71,7 +75,7 @@ def diagnose(
         if not _leaves_much(chosen):
             return chosen
         say("what is left may lie between a motor and its link")
-        for loose, start in loose_joints(chosen, recordings, divided):
+        for loose, start in loose_joints(chosen, recordings):
             loose.outcome = find(loose.search, start)
             if _solves(loose, chosen):
                 loose.outcome.nominal_level = chosen.outcome.nominal_level  # of the arm as it was stated
@@ -85,6 +89,11 @@ def diagnose(
     weigh(chosen.search, chosen.outcome)
     drop_unseen(chosen)
     return describe(chosen, first, began)
+
+
+def _has_not_seen(study: Study) -> bool:
+    """True if what is held out leaves a gap where nothing is left in what was searched."""
+    return study.outcome.level < FAIR and study.foretold().level > AT_FLOOR
 
 
 def _deflections(study: Study) -> list[str]:

@@ -49,9 +49,7 @@ def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]])
     return dataclasses.replace(file, arm=arm, uncertainty=file.uncertainty | spread)
 
 
-def loose_joints(
-    other: Study, recordings: Sequence[Recording], divided: bool
-) -> list[tuple[Study, Hypothesis]]:
+def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[Study, Hypothesis]]:
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
     Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
@@ -68,7 +66,7 @@ def loose_joints(
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
         for contact, candidate, sizes in ((SPRING, spring, COMPLIANCES), (FLANKS, play, GAPS)):
-            study = Study(loosened(other.file, joint, contact), recordings, divided, other.search.say)
+            study = Study(loosened(other.file, joint, contact), recordings, other.held_out, other.search.say)
             few = study.search.thinned()
             fitted, size = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")

@@ -4,6 +4,7 @@
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false, reportOptionalOperand=false
 
 import dataclasses
+import enum
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,6 +30,14 @@ SAMPLES = 25_000  # of one recording that are used
 UNSEEN = 1e-6  # spread of what no reading tells: it stays as it is put
 SLOW = 0.02  # of a joint's typical rate: below it, which way a bristle is bent is a guess
 CALIBRATION = 0.6  # of a recording that is divided; the rest is held out
+
+
+class HeldOut(enum.Enum):
+    """What a diagnosis does not search but is judged by."""
+
+    RUNS = "the later recordings"
+    ENDS = "the ends of all recordings"
+    BEGINNINGS = "the beginnings of all recordings"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,10 +84,12 @@ def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]
     return dataclasses.replace(arm, joints=tuple(joints)), notes
 
 
-def make_problem(file: ArmFile, recordings: Sequence[Recording], divided: bool = False) -> Prepared:
+def make_problem(
+    file: ArmFile, recordings: Sequence[Recording], held_out: HeldOut = HeldOut.RUNS
+) -> Prepared:
     """Check the recordings, find their noise, cut them into pieces.
 
-    `divided`: the end of every recording is held out, and not the later ones of them.
+    `held_out`: what a diagnosis is judged by; of a single recording its end, where whole runs are asked for.
 
     **Raises** `RecordingError` if an input or every output is missing, or too little is left.
     """
@@ -117,21 +128,21 @@ def make_problem(file: ArmFile, recordings: Sequence[Recording], divided: bool =
     spread = np.full(state_size(model, outputs), 1e3)
     spread[bristles(model)] = UNSEEN
     setting = Setting(parameters, outputs, np.array(noise), colour, step, length, substeps, spread)
-    if len(pieces) > 1 and not divided:
+    if len(pieces) > 1 and held_out is HeldOut.RUNS:
         runs = [make_run(piece, inputs, setting) for piece in pieces]
         count = (len(runs) + 1) // 2
-        calibration, held_out = runs[:count], runs[count:]
+        first, second = runs[:count], runs[count:]
     else:
-        cuts = [int(CALIBRATION * len(piece) / length) * length for piece in pieces]
-        calibration = [
-            make_run(p.window(0, cut), inputs, setting) for p, cut in zip(pieces, cuts, strict=True)
-        ]
-        held_out = [
+        share = 1 - CALIBRATION if held_out is HeldOut.BEGINNINGS else CALIBRATION
+        cuts = [int(share * len(piece) / length) * length for piece in pieces]
+        first = [make_run(p.window(0, cut), inputs, setting) for p, cut in zip(pieces, cuts, strict=True)]
+        second = [
             make_run(p.window(cut, len(p)), inputs, setting, cut * step)
             for p, cut in zip(pieces, cuts, strict=True)
         ]
+    calibration, judged_by = (second, first) if held_out is HeldOut.BEGINNINGS else (first, second)
     return Prepared(
-        Problem(setting), calibration, held_out,
+        Problem(setting), calibration, judged_by,
         {name: floors[name].std for name in outputs}, tuple(dict.fromkeys(notes)),
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from ..files.recording import Recording
 from .calibrate import fit
 from .foretell import Foretold, foretell
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
-from .prepare import make_problem
+from .prepare import HeldOut, make_problem
 
 Say = Callable[[str], None]
 
@@ -17,14 +17,15 @@ Say = Callable[[str], None]
 class Study:
     """An arm and the recordings prepared for it; `outcome` is what a search found.
 
-    `divided`: the end of every recording is held out, and not the later ones of them.
+    `held_out`: what the search does not see, and is judged by.
     """
 
     outcome: Outcome
 
-    def __init__(self, file: ArmFile, recordings: Sequence[Recording], divided: bool, say: Say):
+    def __init__(self, file: ArmFile, recordings: Sequence[Recording], held_out: HeldOut, say: Say):
         self.file = file
-        self.prepared = make_problem(file, recordings, divided)
+        self.held_out = held_out
+        self.prepared = make_problem(file, recordings, held_out)
         self.search = Search(self.prepared.problem, self.prepared.calibration, say)
         self.notes = self.prepared.notes
         self._foretold: tuple[Hypothesis, Foretold] | None = None
