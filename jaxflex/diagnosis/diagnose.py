@@ -8,11 +8,11 @@ from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
 from .estimates import drop_unseen, unseen
-from .find import HALFWAY, find
+from .find import HALFWAY, find, find_from
 from .foretell import AT_FLOOR
-from .gauge import BY_GAUGE, by_gauge
+from .gauge import BY_GAUGE, PROMISING, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
-from .loose_joint import LESS, is_of_loose_joint, loose_joints
+from .loose_joint import is_of_loose_joint, loose_joints
 from .prepare import HeldOut
 from .result import Diagnosis
 from .rivals import weigh
@@ -63,7 +63,7 @@ def diagnose(
         say("the deflections may be those that a strain gauge stands for")
         other = Study(other_file, recordings, chosen.held_out, say)
         with_gauge = other.search.thinned().climb(final.effects, final.fit.vector, to=HORIZONS[0])
-        if not with_gauge.closest < LESS * final.closest:
+        if not with_gauge.closest < PROMISING * chosen.level_of_some():
             return chosen
         other.outcome = find(other.search)
         if not other.outcome.final.closest < HALFWAY * final.closest:
@@ -76,9 +76,8 @@ def diagnose(
             return chosen
         say("what is left may lie between a motor and its link")
         for loose, start in loose_joints(chosen, recordings):
-            loose.outcome = find(loose.search, start)
+            loose.outcome = find_from(loose.search, start, chosen.outcome)
             if _solves(loose, chosen):
-                loose.outcome.nominal_level = chosen.outcome.nominal_level  # of the arm as it was stated
                 loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
                 chosen = loose
         return chosen

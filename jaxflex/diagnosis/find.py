@@ -20,6 +20,7 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
+    form_error,
     freedom,
 )
 from .rivals import prune
@@ -38,85 +39,109 @@ HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be
 Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
 
 
-def find(search: Search, start: Hypothesis | None = None) -> Outcome:
-    """Add effects one at a time until nothing in the catalogue stands out.
+def find(search: Search) -> Outcome:
+    """Add effects one at a time until nothing in the catalogue stands out."""
+    base, starts = settled_at(search, (), search.parameters.start)
+    nominal = calibrated(search, base, starts)
+    outcome = Outcome(*nominal, search.over_a_second(nominal[0]))
+    return _added_to(search, outcome, base, starts)
 
-    `start`: the first of them is settled already, with the pieces starting where they are.
+
+def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
+    """Add effects to a first one that is settled already, the pieces starting where they are.
+
+    `other`: what came of the arm as it was stated. What it left without any effect is what there was
+    to explain, and what parts of the arm imitate has been seen there.
     """
-    say = search.say
-    begin = search.starts()
-    base, base_starts = settled_at(search, (), search.parameters.start)
-    outcome: Outcome | None = None
-    levels: list[float] = []
-    for _ in range(MOST_EFFECTS + 1):
-        search.restart(base_starts)
-        fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
-        starts = search.starts()
-        say(
-            f"calibrated with {len(base.effects)} effect(s): misfit {fitted.fit.level:.3g} of the noise floor"
-        )
-        if outcome is None:
-            outcome = Outcome(fitted, starts)
-        outcome.final, outcome.final_starts = fitted, starts
-        levels.append(search.over_a_second(fitted))
-        outcome.nominal_level, outcome.level = levels[0], levels[-1]
-        if start is not None and not fitted.effects:
-            base, base_starts = start, begin
-            continue
-        explained = outcome.explained_over()
-        near = fitted.closest < CLOSE
-        suspect = start is None and is_suspect(search.parameters, fitted, outcome.explained)
-        if fitted.effects and near and levels[-1] - 1 < LITTLE * (levels[0] - 1) and not suspect:
-            break
-        horizons = tuple(h for h in HORIZONS if h <= fitted.horizon)
-        ranked = search.rank(fitted.fit.vector, fitted.effects, horizons)
-        far = fitted.fit.level > CLOSE and fitted.horizon == HORIZONS[0]
-        if far:
-            # a fit that the missing effect has bent is a poor place to judge from: the
-            # parameters as they were before it are judged as well, over the shortest horizon
-            search.restart(base_starts)
-            ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
-        tried = _short_list(ranked)
-        if len(fitted.effects) == MOST_EFFECTS or not (tried or suspect):
-            break
-        before, before_starts = (base, base_starts) if far else (fitted, starts)
-        confirmed: list[Confirmed] = []
+    outcome = Outcome(other.nominal, other.nominal_starts, other.nominal_level)
+    starts = search.starts()
+    _advance(search, outcome, first, starts)
+    return _added_to(search, outcome, first, starts, parts=False)
 
-        def confirm(items, before, before_starts, fitted=fitted, explained=explained, confirmed=confirmed):
-            for item in items:
-                found, found_starts = confirmed_from(search, before, before_starts, item, fitted.horizon)
-                say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
-                if search.sensible(found):
-                    confirmed.append((found.strength(fitted, explained), found, found_starts))
 
-        confirm(tried, before, before_starts)
-        if far and not any(
-            strength > STRONG and _worth_it(fitted, found) for strength, found, _ in confirmed
-        ):
-            # parameters bent by two effects may leave less than either of them does alone
-            for item in tried[:PAIR]:
-                first, first_starts = adopted(search, base, base_starts, item)
-                more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
-                confirm(_short_list(more)[:PAIR], first, first_starts)
-        if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
-            search.restart(base_starts)
-            stated, stated_starts = straightened(search, base)
-            parts = sift(search, stated, stated_starts, search.parts(stated.effects))
-            confirm(parts, stated, stated_starts)
-        confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
-        if not confirmed:
+def calibrated(search: Search, base: Hypothesis, starts: Starts) -> tuple[Hypothesis, Starts]:
+    """The hypothesis fitted over as long as it follows, and where its pieces start."""
+    search.restart(starts)
+    fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
+    count, level = len(base.effects), fitted.fit.level
+    search.say(f"calibrated with {count} effect(s): misfit {level:.3g} of the noise floor")
+    return fitted, search.starts()
+
+
+def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts) -> None:
+    outcome.final, outcome.final_starts = calibrated(search, base, starts)
+    outcome.level = search.over_a_second(outcome.final)
+
+
+def _added_to(
+    search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, parts: bool = True
+) -> Outcome:
+    """The outcome with what else stands out; its final hypothesis began at `base`."""
+    while len(outcome.final.effects) < MOST_EFFECTS:
+        found = next_effect(search, outcome, base, starts, parts)
+        if found is None:
             break
-        strength, best, best_starts = simplest(search, confirmed)
-        if not (
-            strength > STRONG or (suspect and straightens(search.parameters, fitted, best, outcome.explained))
-        ):
-            break
-        outcome.close[best.effects[-1].key] = nearly_as_good(search, fitted, best, confirmed)
-        base, base_starts = best, best_starts
-    assert outcome is not None
+        base, starts = found
+        _advance(search, outcome, base, starts)
     search.restart(outcome.final_starts)
     prune(search, outcome)
     return outcome
+
+
+def next_effect(
+    search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool
+) -> tuple[Hypothesis, Starts] | None:
+    """What to add to the outcome's final hypothesis, which began at `base`; None if nothing stands out.
+
+    `parts`: whether changes of the arm's parts are tried where its parameters went too far.
+    """
+    fitted, starts, explained = outcome.final, outcome.final_starts, outcome.explained_over()
+    suspect = parts and is_suspect(search.parameters, fitted, outcome.explained)
+    little = outcome.level - 1 < LITTLE * (outcome.nominal_level - 1)
+    if fitted.effects and fitted.closest < CLOSE and little and not suspect:
+        return None
+    search.restart(starts)
+    ranked = search.rank(fitted.fit.vector, fitted.effects, tuple(h for h in HORIZONS if h <= fitted.horizon))
+    far = fitted.fit.level > CLOSE and fitted.horizon == HORIZONS[0]
+    if far:
+        # a fit that the missing effect has bent is a poor place to judge from: the
+        # parameters as they were before it are judged as well, over the shortest horizon
+        search.restart(base_starts)
+        ranked = _merge(search.rank(base.fit.vector, base.effects, (1,)), ranked)
+    if not suspect:
+        form = form_error(fitted.effects, explained)
+        ranked = [item for item in ranked if item.gain > form[item.horizon]]
+    tried = _short_list(ranked)
+    before, before_starts = (base, base_starts) if far else (fitted, starts)
+    confirmed: list[Confirmed] = []
+
+    def confirm(items: list[Ranked], before: Hypothesis, before_starts: Starts) -> None:
+        for item in items:
+            found, found_starts = confirmed_from(search, before, before_starts, item, fitted.horizon)
+            search.say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
+            if search.sensible(found):
+                confirmed.append((found.strength(fitted, explained), found, found_starts))
+
+    confirm(tried, before, before_starts)
+    if far and not any(strength > STRONG and _worth_it(fitted, found) for strength, found, _ in confirmed):
+        # parameters bent by two effects may leave less than either of them does alone
+        for item in tried[:PAIR]:
+            first, first_starts = adopted(search, base, base_starts, item)
+            more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
+            confirm(_short_list(more)[:PAIR], first, first_starts)
+    if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
+        search.restart(base_starts)
+        stated, stated_starts = straightened(search, base)
+        confirm(sift(search, stated, stated_starts, search.parts(stated.effects)), stated, stated_starts)
+    confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
+    if not confirmed:
+        return None
+    strength, best, best_starts = simplest(search, confirmed)
+    straight = suspect and straightens(search.parameters, fitted, best, outcome.explained)
+    if not (strength > STRONG or straight):
+        return None
+    outcome.close[best.effects[-1].key] = nearly_as_good(search, fitted, best, confirmed)
+    return best, best_starts
 
 
 def confirmed_from(
@@ -265,5 +290,9 @@ def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:
 
 
 def _short_list(ranked: list[Ranked]) -> list[Ranked]:
+    """The strongest, and those near the strongest of the others that stand out most at the same horizon."""
     strong = [item for item in ranked if item.strength > STRONG]
-    return [item for item in strong if item.strength > NEAR * strong[0].strength][:SHORT_LIST]
+    most: dict[int, float] = {}
+    for item in strong:
+        most.setdefault(item.horizon, item.strength)
+    return [item for item in strong if item.strength > NEAR * most[item.horizon]][:SHORT_LIST]

@@ -74,11 +74,10 @@ class Hypothesis:
         share of it may be due to the form that they were given.
         """
         shared = self.costs.keys() & other.costs.keys()
-        already = explained or {}
-        form = KNOWN_FORM if {e.effect for e in other.effects} <= FORM_IS_KNOWN else FORM
+        form = form_error(other.effects, explained or {})
         return max(
             (
-                (other.costs[h] - self.costs[h]) / (allowance(self.fit.count, h) + form * already.get(h, 0.0))
+                (other.costs[h] - self.costs[h]) / (allowance(self.fit.count, h) + form.get(h, 0.0))
                 for h in shared
             ),
             default=-np.inf,
@@ -98,6 +97,13 @@ class Ranked:
     step: tuple[float, ...]
     gain: float
     strength: float
+    horizon: int = HORIZONS[0]
+
+
+def form_error(effects: tuple[Candidate, ...], explained: dict[int, float]) -> dict[int, float]:
+    """Gain at each horizon that another form of these effects may bring, of the cost that they have `explained`."""
+    share = KNOWN_FORM if {effect.effect for effect in effects} <= FORM_IS_KNOWN else FORM
+    return {horizon: share * cost for horizon, cost in explained.items()}
 
 
 def allowance(count: int, horizon: int) -> float:
@@ -271,7 +277,7 @@ class Search:
                 strength = score.gain / allowance(normal.count, horizon)
                 kept = best.get(candidate.key)
                 if kept is None or strength > kept.strength:
-                    best[candidate.key] = Ranked(candidate, step, score.gain, strength)
+                    best[candidate.key] = Ranked(candidate, step, score.gain, strength, horizon)
         return sorted(best.values(), key=lambda ranked: -ranked.strength)
 
     def parts(self, effects: tuple[Candidate, ...]) -> list[Ranked]:
@@ -342,15 +348,18 @@ class Search:
 
 
 class Outcome:
-    """What the search came to: the nominal fit, the final one, and rivals of each effect."""
+    """What the search came to: the nominal fit, the final one, and rivals of each effect.
 
-    def __init__(self, nominal: Hypothesis, starts: Starts):
+    `level`: misfit a reading over the longest horizon; `nominal_level`: the same without any effect.
+    """
+
+    def __init__(self, nominal: Hypothesis, starts: Starts, level: float):
         self.nominal = nominal
         self.nominal_starts = starts
+        self.nominal_level = level
         self.final = nominal
         self.final_starts = starts
-        self.level = np.inf  # misfit a reading over the longest horizon
-        self.nominal_level = np.inf  # the same without any effect
+        self.level = level
         self.rivals: list[tuple[int, Hypothesis]] = []
         self.close: dict[tuple[str, str], list[Ranked]] = {}  # what did as well when an effect was added
         self.gains: list[float] = []

@@ -20,6 +20,7 @@ from .shooting import Problem, Run
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece
+RUNAWAY = 1e6  # rad/s: beyond it a motion is lost
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,10 @@ def equations(problem: Problem) -> list[tuple[str, str, int]]:
 
 
 def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) -> list[LatentForce]:
-    """The force in every equation that would make the model fit, the likeliest first."""
+    """The force in every equation that would make the model fit, the likeliest first.
+
+    None where the motion is lost.
+    """
     s = problem.setting
     places = equations(problem)
     joints = run.command.shape[1]
@@ -77,11 +81,14 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
         angle = motion.angle(joint).mean(0)[:, middle].ravel()
         rate = motion.rate(joint).mean(0)[:, middle].ravel()
         times = motion.time[:, middle].ravel()
+        values = values.ravel()
+        followed = np.isfinite(rate) & (np.abs(rate) < RUNAWAY) & np.isfinite(angle) & np.isfinite(values)
+        values, angle, rate = (np.where(followed, part, 0.0) for part in (values, angle, rate))
         acceleration = np.gradient(rate, times)
         inside = times <= run.times[-1]
         found.append(
             LatentForce(
-                name, unit, times[inside], values.ravel()[inside], evidence,
+                name, unit, times[inside], values[inside], evidence,
                 angle[inside], rate[inside], acceleration[inside],
             )
         )  # fmt: skip
@@ -113,7 +120,8 @@ def _estimate(
             by_force[:, own] += linear.end_by_column[j][:, part]
             by_start, offset = through @ by_start, through @ offset + linear.gap[j]
         table = np.concatenate(rows).reshape(-1, states + count + 1)
-        gram = table.T @ table
+        with np.errstate(all="ignore"):
+            gram = table.T @ table
         a = slice(0, states)
         inner = gram[a, a] + np.diag(1 / problem.setting.start_spread**2)
         gram = gram[states:, states:] - gram[states:, a] @ solve(inner, gram[a, states:])
@@ -121,7 +129,10 @@ def _estimate(
             gram = np.zeros_like(gram)  # nothing can be said of a motion that left all bounds
         systems.append(gram)
     # the prior's standard deviation by evidence, on a grid of half decades
-    typical = np.median([np.median(np.diag(g)[:-1]) for g in systems])
+    sizes = [np.median(np.diag(g)[:-1]) for g in systems if g.any()]
+    if not sizes:
+        return np.zeros((run.pieces, blocks)), 0.0
+    typical = np.median(sizes)
     spectra = [(*np.linalg.eigh(g[:-1, :-1]), g[:-1, -1]) for g in systems]
     best = (0.0, 0.0)
     for spread in np.logspace(-2, 4, 13) / np.sqrt(max(typical, 1e-300)):

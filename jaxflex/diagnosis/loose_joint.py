@@ -32,9 +32,7 @@ SPRING = {  # the same, of a joint whose flexibility is all there is: hard flank
 COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
-LESS = (
-    0.8  # of the misfit over the shortest horizon: what a loose joint must leave less of to be tried in full
-)
+LESS = 0.5  # of the misfit over the shortest horizon beyond the noise: what a loose joint may leave
 TURNS = 3  # of trying the other flank and fitting again
 HELPS = 0.9  # of the cost: a turn that leaves more has not helped
 
@@ -53,9 +51,10 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
     Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
-    that `other` found, leaves clearly less than `other` does: else it is left out.
+    that `other` found, leaves far less than `other` does: else it is left out.
     """
     found = []
+    most = max(1 + LESS * (other.level_of_some() - 1), GONE)
     for joint, own in enumerate(other.file.arm.joints):
         lumped = any(
             getattr(link, "model", "") == "lumped" for link in other.file.arm.links[joint : joint + 1]
@@ -74,8 +73,7 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             if other.file.arm.links and fitted.fit.level < GONE:
                 break
         study, few, fitted, size = min(tried, key=lambda entry: entry[2].fit.cost)
-        with_others = joined(few, fitted, other)
-        if with_others.closest < max(LESS * other.outcome.final.closest, GONE):
+        if joined(few, fitted, other).closest < most:
             found.append((study, best_from(study.search, fitted.effects[0], [size])[0]))
     return found
 

@@ -41,7 +41,7 @@ def test_the_force_that_stands_for_a_cable_is_a_line_over_the_angle(swung):
     search = swung(EFFECTS["cable_stiffness"](stiffness, rest_angle=0.0))
     vector = adopt(search.parameters, search.parameters.start, CABLE, (stiffness, 0.0))
     final = Hypothesis((CABLE,), search.settle(vector, HORIZONS[-1]), HORIZONS[-1], {})
-    outcome = Outcome(final, search.starts())
+    outcome = Outcome(final, search.starts(), np.inf)
     outcome.final, outcome.final_starts = final, search.starts()
     force = next(force for force in lacking(search, outcome) if force.equation == "joint_1")
     slope, offset = np.polyfit(force.angle, force.values, 1)

@@ -65,7 +65,7 @@ def test_parameters_do_not_depend_on_what_was_foretold_before(hidden):
     recordings = [jf.read_recording(path) for path in sorted(folder.glob("run_*.csv"))]
     study = Study(jf.read_arm_file(folder / "arm.toml"), recordings, False, lambda line: None)
     search = study.search
-    study.outcome = Outcome(search.climb((), search.parameters.start, to=1), search.starts())
+    study.outcome = Outcome(search.climb((), search.parameters.start, to=1), search.starts(), np.inf)
     study.foretold()
     ends = []
     for run in (None, *study.prepared.held_out):

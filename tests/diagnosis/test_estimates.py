@@ -28,7 +28,7 @@ def test_one_amplitude_beyond_its_deviation_is_enough(search):
 def test_effects_that_come_to_nothing_are_dropped_but_for_the_last(recorded):
     study = Study(*recorded(QuadraticDrag(1e-3)), False, lambda line: None)
     search = study.search
-    study.outcome = Outcome(search.climb((), search.parameters.start), search.starts())
+    study.outcome = Outcome(search.climb((), search.parameters.start), search.starts(), np.inf)
     study.outcome.final = search.climb((DRAG, OFFSET, RIPPLE), search.parameters.start)
     study.outcome.final_starts = search.starts()
     study.outcome.gains = [3.0, 2.0, 1.0]

@@ -18,8 +18,8 @@ def fitted(*costs):
 
 
 def outcome(final, nominal_level, level):
-    found = Outcome(fitted(5e3), [])
-    found.final, found.nominal_level, found.level = final, nominal_level, level
+    found = Outcome(fitted(5e3), [], nominal_level)
+    found.final, found.level = final, level
     return found
 
 

@@ -19,7 +19,7 @@ def test_an_effect_of_no_size_is_dropped_whatever_the_others_leave(search):
     search = Search(search.problem, rough, print)
     nominal = search.climb((), search.parameters.start)
     assert nominal.closest > CLOSE
-    outcome = Outcome(nominal, search.starts())
+    outcome = Outcome(nominal, search.starts(), np.inf)
     vector = adopt(search.parameters, nominal.fit.vector, OFFSET, (1e-3,))
     outcome.final = dataclasses.replace(
         nominal, effects=(DRAG, OFFSET), fit=dataclasses.replace(nominal.fit, vector=vector)
