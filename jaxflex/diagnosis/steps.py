@@ -22,7 +22,7 @@ import numpy as np
 from ..arm.arm import AssembledArm
 from .plant import Direction, Instruments, Interval, Moments, Pieces, Response, interval_slopes, lag
 
-MOMENTS = 128  # intervals that are made linear at once
+MOMENTS = 850  # intervals that are made linear at once; fewer take longer, and powers of two do
 LANES = 8  # parameters whose slopes are taken side by side: one compiled program whatever their number
 
 
