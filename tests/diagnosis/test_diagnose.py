@@ -16,8 +16,9 @@ from jaxflex.diagnosis import diagnose
 from jaxflex.diagnosis.gauge import by_gauge
 from jaxflex.diagnosis.hypothesis import Outcome, Search
 from jaxflex.diagnosis.parameters import _nominal
-from jaxflex.diagnosis.prepare import make_problem
+from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
+from jaxflex.effects import VoltageSaturation
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 
@@ -63,7 +64,7 @@ def test_what_is_hidden_is_named_and_the_gap_closes(hidden, name):
 def test_parameters_do_not_depend_on_what_was_foretold_before(hidden):
     folder, _ = hidden["nothing"]
     recordings = [jf.read_recording(path) for path in sorted(folder.glob("run_*.csv"))]
-    study = Study(jf.read_arm_file(folder / "arm.toml"), recordings, False, lambda line: None)
+    study = Study(jf.read_arm_file(folder / "arm.toml"), recordings, HeldOut.RUNS, lambda line: None)
     search = study.search
     study.outcome = Outcome(search.climb((), search.parameters.start, to=1), search.starts(), np.inf)
     study.foretold()
@@ -93,6 +94,27 @@ def test_what_a_bare_axis_hides_is_named(tmp_path, name, where_it_shows):
     assert [e.name for e in found.effects] == [name]
     for channel, floor in found.gap.noise_floor.items():
         assert found.gap.after[channel] < 1.2 * floor
+
+
+def test_what_shows_at_the_end_alone_is_named():
+    """Where the end is held out nothing is missing; so it is searched, and the beginning held out."""
+    motor = jf.DCMotor(1.2, 0.06, 0.06)
+    arm = jf.Arm((), (jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor),), drive="voltage")
+    times = jnp.linspace(0.0, 2.0, 1001)
+    louder = 1.0 + 2.0 * (times > 1.5)
+    command = louder * jnp.sin(8.0 * times)
+    pushes = Replayed(command[:, None], 0.002)
+    true = dataclasses.replace(arm, effects=(VoltageSaturation(2.2),))
+    run = jf.simulate(true, pushes, Step((0.0,), (0.0,)), times)
+    noise = 1e-4 * np.random.default_rng(0).normal(size=1001)
+    channels = {"voltage_1": np.asarray(command), "angle_1": np.asarray(run["angle_1"]) + noise}
+    said = []
+    recording = jf.Recording(np.asarray(times), channels, ())
+    found = diagnose(jf.ArmFile(arm, {"default": 0.03}, None), [recording], said.append)
+    assert any(HeldOut.BEGINNINGS.value in line for line in said)
+    assert [effect.name for effect in found.effects] == ["voltage_saturation"]
+    assert found.effects[0].parameters["limit"].value == pytest.approx(2.2, rel=0.02)
+    assert found.gap.after["angle_1"] < 1.2 * found.gap.noise_floor["angle_1"]
 
 
 def test_nothing_hidden_is_nothing_missing(hidden):

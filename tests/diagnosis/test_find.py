@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.find import confirmed_from
+from jaxflex.diagnosis.find import _short_list, confirmed_from
 from jaxflex.diagnosis.hypothesis import CLOSE, Ranked, Search
 from jaxflex.effects import StribeckFriction
 
@@ -43,3 +43,16 @@ def test_what_takes_the_place_of_another_is_fitted_from_the_stated_parameters_to
     # what takes nothing's place goes on from where the parameters are
     drag, _ = confirmed_from(search, before, search.starts(), Ranked(DRAG, (1e-4,), 0.0, 0.0), 1)
     assert drag.costs == {1: 1e9}
+
+
+def test_what_stands_out_at_one_horizon_does_not_hide_what_does_at_another():
+    """A slow instrument explains most over a second, damping most over a tenth of one."""
+    items = [
+        Ranked(candidate, (1.0,), gain, strength, horizon)
+        for candidate, gain, strength, horizon in [
+            (COULOMB, 6e3, 160.0, 1),
+            (STRIBECK, 2e3, 60.0, 1),
+            (DRAG, 15e3, 50.0, 10),
+        ]
+    ]
+    assert [item.candidate for item in _short_list(items)] == [COULOMB, DRAG]

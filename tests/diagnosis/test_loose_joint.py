@@ -8,7 +8,7 @@ import pytest
 from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.loose_joint import FLANKS, best_from, loosened
-from jaxflex.diagnosis.prepare import make_problem
+from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
 from jaxflex.files.arm_file import ArmFile
 
@@ -27,7 +27,7 @@ def study():
     )
     recording, _ = record(dataclasses.replace(arm, joints=(joint,)))
     file = ArmFile(arm, {"default": 0.01}, None)
-    return Study(loosened(file, 0, FLANKS), [recording], False, lambda line: None)
+    return Study(loosened(file, 0, FLANKS), [recording], HeldOut.ENDS, lambda line: None)
 
 
 @pytest.mark.parametrize("size", [GAP / 3, 3 * GAP])

@@ -40,6 +40,16 @@ def test_a_parameter_within_its_uncertainty_leaves_no_gap():
     assert gap.size < 0.1
 
 
+def test_what_brings_parameters_back_to_their_nominal_values_leaves_no_gap():
+    """Twenty standard deviations from the plant without it, none from what the arm file says."""
+    rig = true_rig("axis", "fit")
+    rig.body["hub_inertia"] = rig.body["hub_inertia"] * 1.6
+    moved = rig.copy()
+    moved.body["hub_inertia"] = moved.body["hub_inertia"] / 1.6
+    assert measure([rig], [moved], COARSE)[0][0].size < 0.2
+    assert measure([moved], [rig], COARSE)[0][0].size > 3.0
+
+
 def test_cases_are_as_asked(tmp_path):
     wanted = [("coulomb_friction",), ("sensor_lag",), ()]
     cases = make_cases("single_link", wanted, [3.0], [0])
