@@ -45,10 +45,10 @@ def diagnose(
         begun.outcome = find(begun.search)
         return begun
 
-    chosen = study(HeldOut.RUNS if len(recordings) > 1 else HeldOut.ENDS)
-    for held_out in (HeldOut.ENDS, HeldOut.BEGINNINGS):
-        if held_out is chosen.held_out or not _has_not_seen(chosen):
-            continue
+    chosen = study(HeldOut.RUNS)
+    for held_out in (HeldOut.ENDS, HeldOut.BEGINNINGS)[len(recordings) == 1 :]:
+        if not _has_not_seen(chosen):
+            break
         say(f"what is held out shows what the rest does not: {held_out.value} are held out instead")
         other = study(held_out)
         if other.foretold().level < chosen.foretold().level:

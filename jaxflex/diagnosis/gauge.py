@@ -10,9 +10,7 @@ import dataclasses
 from ..files.arm_file import ArmFile
 
 MODES = 3  # that a gauge shows
-PROMISING = (
-    0.8  # of the misfit over the shortest horizon: what a gauge must leave less of to be tried in full
-)
+PROMISING = 0.8  # of the misfit over the shortest horizon: a gauge that leaves less is tried in full
 BY_GAUGE = (
     "the tip's deflection is followed far better as what a strain gauge at the root shows, scaled under a weight "
     "at the tip (deflection_from = 'gauge'); at high frequencies the two differ"

@@ -134,11 +134,12 @@ def make_problem(
         first, second = runs[:count], runs[count:]
     else:
         share = 1 - CALIBRATION if held_out is HeldOut.BEGINNINGS else CALIBRATION
-        cuts = [int(share * len(piece) / length) * length for piece in pieces]
-        first = [make_run(p.window(0, cut), inputs, setting) for p, cut in zip(pieces, cuts, strict=True)]
+        parts = [(piece, max(int(share * len(piece) / length), 1) * length) for piece in pieces]
+        first = [make_run(piece.window(0, cut), inputs, setting) for piece, cut in parts]
         second = [
-            make_run(p.window(cut, len(p)), inputs, setting, cut * step)
-            for p, cut in zip(pieces, cuts, strict=True)
+            make_run(piece.window(cut, len(piece)), inputs, setting, cut * step)
+            for piece, cut in parts
+            if cut < len(piece)
         ]
     calibration, judged_by = (second, first) if held_out is HeldOut.BEGINNINGS else (first, second)
     return Prepared(

@@ -5,6 +5,7 @@ import numpy as np
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.estimates import drop_unseen, is_seen
 from jaxflex.diagnosis.hypothesis import Outcome
+from jaxflex.diagnosis.prepare import HeldOut
 from jaxflex.diagnosis.result import Estimate
 from jaxflex.diagnosis.study import Study
 from jaxflex.effects import QuadraticDrag
@@ -26,7 +27,7 @@ def test_one_amplitude_beyond_its_deviation_is_enough(search):
 
 
 def test_effects_that_come_to_nothing_are_dropped_but_for_the_last(recorded):
-    study = Study(*recorded(QuadraticDrag(1e-3)), False, lambda line: None)
+    study = Study(*recorded(QuadraticDrag(1e-3)), HeldOut.ENDS, lambda line: None)
     search = study.search
     study.outcome = Outcome(search.climb((), search.parameters.start), search.starts(), np.inf)
     study.outcome.final = search.climb((DRAG, OFFSET, RIPPLE), search.parameters.start)
