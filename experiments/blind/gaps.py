@@ -21,7 +21,7 @@ from .rigs import NOISE, Rig
 from .sensitivities import sensitivities
 from .simulator import CHANNELS
 
-RARE = 1000
+RARE = 1000  # of arms as stated: one departs farther than a calibration may go
 PASSES = 3  # of Gauss-Newton
 PROBE = 1e-4  # step of a parameter's logarithm, for the derivative by it
 
