@@ -25,20 +25,20 @@ def prepare(body: Mapping[str, np.ndarray], step: float) -> dict[str, np.ndarray
     """Arrays that `advance` needs for a body."""
     s = structure(body)
     arrays = {k: s[k] for k in (*ROWS, "first_moment")}
-    return arrays | {"step": exact_step(s, body["foreshortening"][0], step)}
+    outward = np.diag(s["mode"]) - body["foreshortening"][0] * s["tension"]
+    return arrays | {"outward": outward, "step": exact_step(s, outward, step)}
 
 
-def exact_step(s: Mapping[str, np.ndarray], foreshortening: float, step: float):
+def exact_step(s: Mapping[str, np.ndarray], outward: np.ndarray, step: float):
     """[state, voltage, forces, coordinates x rate squared] -> state after `step` [s].
 
     The voltage is held and the linear part exact (matrix exponential); a force along one of
     the rows FORCED is a kick at the beginning. The last columns are what a turning link
-    feels: its modes are thrown outwards, and stiffened where `foreshortening` is one.
+    feels: its modes are thrown `outward`, and stiffened where it is shorter as it bends.
     """
     block = np.zeros((STATES + 1, STATES + 1))
     block[:STATES] = s["system"]
     flow = scipy.linalg.expm(block * step)[:STATES]
-    outward = np.diag(s["mode"]) - foreshortening * s["tension"]
     along = np.stack([s[name] for name in FORCED], axis=1)
     kicks = step * s["mobility"] @ np.concatenate([along, outward], axis=1)
     return np.concatenate([flow, flow[:, 1 + COORDINATES : STATES] @ kicks], axis=1)
@@ -49,13 +49,18 @@ def split(state):
     return state[0], state[1 : 1 + COORDINATES], state[1 + COORDINATES :]
 
 
+def held_by_bending(p, x, v):
+    """Angular momentum [N m s] that the link has because it is bent."""
+    inertia = sum(q * dot(row, x) for row, q in zip(p["outward"], x, strict=True))
+    return dot(p["frame"], v) * inertia
+
+
 def begin(plant, start):
     """Memory: state, bristle [1], momentum of the bent link [N m s], resistance added by heat [ohm]."""
     state = tuple(start[k] for k in range(STATES))
     _, x, v = split(state)
     nothing = jnp.zeros_like(start[0])
-    spin = dot(plant["arm"]["frame"], v)
-    held = spin * sum(m * q * q for m, q in zip(plant["arm"]["mode"], x, strict=True))
+    held = held_by_bending(plant["arm"], x, v)
     return state, nothing, held, nothing
 
 
@@ -87,7 +92,7 @@ def forces(plant, memory, time, disturbance, step):
     on_hub = disturbance + push - p["cable"] * (hub - p["cable_rest"]) - p["load"]
 
     # the bent link holds angular momentum, and gives it back; its weight hangs beside its axis
-    held = spin * sum(m * q * q for m, q in zip(p["mode"], x, strict=True))
+    held = held_by_bending(p, x, v)
     heading = angle + p["gravity_direction"]
     sideways = dot(p["gravity"], x) - p["first_moment"] * angle
     on_frame = (momentum - held) / step + p["gravity_field"] * jnp.sin(heading) * sideways

@@ -132,12 +132,18 @@ def drives(plant, i, weakening, bristles, coordinates, rates, time, disturbance,
     return tuple(zip(*out, strict=True))
 
 
+def outward(p, j, q):
+    """Force on the modes of a link that turns at 1 rad/s; times `q`, the inertia [kg m^2] that bending adds."""
+    return tuple(dot(p["outward"][j, k], q) for k in range(MODES))
+
+
 def bend(plant, j, q, q_rate, spin):
     """Generalised force on the modes of a link that its own state exerts [N kg^-0.5]."""
     p = plant["arm"]
     harden = -plant["joint"]["hardening"][j] * dot(p["tip"][j], q) ** 3
+    thrown = outward(p, j, q)
     return tuple(
-        spin * spin * dot(p["outward"][j, k], q) - p["stiff"][j, k] * q[k] - p["damp"][j, k] * q_rate[k]
+        spin * spin * thrown[k] - p["stiff"][j, k] * q[k] - p["damp"][j, k] * q_rate[k]
         + p["tip"][j, k] * harden
         for k in range(MODES)
     )  # fmt: skip
@@ -146,7 +152,7 @@ def bend(plant, j, q, q_rate, spin):
 def constants(p, j, q):
     """Of a bent link: b.q, c.q's own inertia less that of its modes, and the lever l = S - b.c."""
     c, b = p["coupling"][j], p["weight"][j]
-    effective = p["inertia"][j] + p["hub"][j] + dot(q, q) - dot(c, c)
+    effective = p["inertia"][j] + p["hub"][j] + dot(outward(p, j, q), q) - dot(c, c)
     return dot(b, q), effective
 
 
@@ -158,7 +164,7 @@ def answer(plant, coordinates, rates, torque):
     w, inertia = constants(p, 1, q)
     lever = s - dot(b, c)
     own = bend(plant, 1, q, q_rate, spin)
-    turning = torque - 2 * spin * dot(q, q_rate) - dot(c, own)
+    turning = torque - 2 * spin * dot(outward(p, 1, q), q_rate) - dot(c, own)
     matrix = (m - w * w / inertia, w * lever / inertia, m - dot(b, b) - lever * lever / inertia)
     along = -2 * spin * dot(b, q_rate) - spin * spin * s - w * turning / inertia
     across = dot(b, own) - spin * spin * w + lever * turning / inertia
@@ -189,7 +195,7 @@ def accelerations(plant, coordinates, rates, torques, push):
     own = bend(plant, 0, q, q_rate, spin)
     held = tuple(own[k] - b[k] * up_y - slope[k] * back for k in range(MODES))
     turning = through[0] + on_hub[0] - back + bq * up_x - p["first_moment"][0] * up_y
-    turning = turning - 2 * spin * dot(q, q_rate) - dot(c, held)
+    turning = turning - 2 * spin * dot(outward(p, 0, q), q_rate) - dot(c, held)
     lever = length - dot(c, tip)
     # A = a - G F and F = L A + l
     a_x = up_x - 2 * spin * deflection_rate - spin * spin * length - deflection * turning / inertia

@@ -87,8 +87,9 @@ def lossless(plant):
 
 
 def energy_of_one(substeps):
-    """Total and kinetic energy [J] of a swinging, ringing arm with a cable, a stiffening link, a stop."""
+    """Total and kinetic energy [J] of a swinging, ringing arm: a cable, a link that stiffens and shortens, a stop."""
     rig = lossless("single_link")
+    rig.body["foreshortening"][:] = 1.0
     rig.set(0, cable=0.3, hardening=1e5)
     rig.arm |= {"gravity_field": 3.0, "stop": 20.0, "stop_place": 0.1}
     start = np.zeros(STATES)
@@ -100,8 +101,9 @@ def energy_of_one(substeps):
     x, v = states[:, X][:, :5], states[:, V][:, :5]
     angle, rate = states[:, X] @ s["frame"], states[:, V] @ s["frame"]
     bent, tip = states[:, X] @ s["deflection"], states[:, X] @ s["tip"]
-    modes = states[:, X] * s["mode"]
-    kinetic = 0.5 * np.einsum("ni,ij,nj->n", v, mass, v) + 0.5 * rate**2 * (modes**2).sum(axis=1)
+    outward = np.diag(s["mode"]) - rig.body["foreshortening"][0] * s["tension"]
+    thrown = np.einsum("ni,ij,nj->n", states[:, X], outward, states[:, X])
+    kinetic = 0.5 * np.einsum("ni,ij,nj->n", v, mass, v) + 0.5 * rate**2 * thrown
     stored = 0.5 * np.einsum("ni,ij,nj->n", x, stiff, x) + 0.15 * angle**2 + 1e5 / 4 * bent**4
     stored += 10.0 * np.maximum(tip - 0.1, 0.0) ** 2
     sideways = states[:, X] @ s["gravity"] - s["first_moment"] * angle
@@ -112,6 +114,7 @@ def energy_of_one(substeps):
 def energy_of_two(substeps):
     """The same of two swinging, ringing links: every point moves with (u - w turn, v + x turn + w')."""
     rig = lossless("two_link")
+    rig.body["foreshortening"][:] = 5.0
     rig.arm["gravity_field"] = 3.0
     n = two_link.COORDINATES
     start = np.zeros(two_link.STATES)
@@ -124,7 +127,7 @@ def energy_of_two(substeps):
     for j in range(2):
         spin, heading = spin + rate[j], heading + turn[j]
         m, s, c, b = (a[k][j] for k in ("mass", "first_moment", "coupling", "weight"))
-        inertia = a["inertia"][j] + a["hub"][j] + (q[j] ** 2).sum(axis=0)
+        inertia = a["inertia"][j] + a["hub"][j] + np.einsum("kn,kl,ln->n", q[j], a["outward"][j], q[j])
         total += 0.5 * m * (u * u + v * v) + 0.5 * spin**2 * inertia + 0.5 * (q_rate[j] ** 2).sum(axis=0)
         total += spin * (c @ q_rate[j]) + v * (s * spin + b @ q_rate[j]) - u * spin * (b @ q[j])
         total += 0.5 * a["stiff"][j] @ q[j] ** 2
