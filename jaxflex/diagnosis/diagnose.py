@@ -19,6 +19,7 @@ from .rivals import weigh
 from .signs import righted
 from .study import Study
 
+UNSEEN = 0.05  # misfit a reading by which what is held out leaves more than what was searched; usual is half of that
 SOLVED = 0.2  # of what is left of a gap: a joint that comes apart, with all it adds, must leave less
 
 
@@ -91,8 +92,17 @@ def diagnose(
 
 
 def _has_not_seen(study: Study) -> bool:
-    """True if what is held out leaves a gap where nothing is left in what was searched."""
-    return study.outcome.level < FAIR and study.foretold().level > AT_FLOOR
+    """True if what is held out leaves a gap where nothing is left in what was searched.
+
+    A small gap says so where no effect was named, whose form could be to blame, or where the arm's
+    parameters went farther than they should.
+    """
+    outcome, left = study.outcome, study.foretold().level
+    if outcome.level >= FAIR:
+        return False
+    if outcome.final.effects and not is_bent(study.search.parameters, outcome.final, outcome.explained):
+        return left > AT_FLOOR
+    return left > outcome.level + UNSEEN
 
 
 def _deflections(study: Study) -> list[str]:
