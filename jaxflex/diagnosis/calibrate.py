@@ -17,6 +17,8 @@ FAITHFUL = 0.1  # of a fall of the cost: slopes that foretell it better than tha
 SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
 WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
+WORSE = 1.5  # growth of the cost over an iteration, as the next slopes see it, at which it is taken back
+REFUSALS = 3  # in a row, at which a fit ends
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
 
@@ -107,8 +109,46 @@ def fit(
         for run, starts in zip(runs, kept[3], strict=True):
             run.starts = starts.copy()
 
+    def chords(kept, first, linears, damping):
+        """Steps with the same slopes; the best place so far, what the first promised, and whether they settled."""
+        before = cost = kept[0]
+        current, shown, promise, settled = first, linears, np.inf, False
+        for chord in range(CHORDS):
+            _, pull, precision = freedom.prior(vector)
+            matrix, pull = current.matrix + np.diag(precision), current.vector + pull
+            matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
+            step = bounded(matrix, pull, freedom.lowest - vector[columns])
+            if not np.isfinite(step).all():
+                break
+            if chord == 0:
+                promise = current.promise + float(pull @ step)
+            here = [run.starts.copy() for run in runs]
+            problem.move_starts(current, step)
+            vector[columns] += step
+            with np.errstate(all="ignore"):
+                before_step = shown
+                shown = [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
+                if horizon == 1:
+                    shown = [
+                        held_back(problem, run, vector, *parts)
+                        for run, *parts in zip(runs, here, before_step, shown, strict=True)
+                    ]
+                current = condensed(shown)
+            new = current.cost + prior(vector)
+            if not np.isfinite(new):
+                break
+            settled = abs(cost - new) < 0.1 * tolerance * current.count
+            diverges = new > 100 * before
+            cost = new
+            if cost < kept[0]:
+                kept = keep(cost, current)
+            if settled or diverges:
+                break
+        return kept, promise, settled
+
     damping = 0.0
-    kept = None
+    kept = best = None
+    refused = 0
     renew = False
     for iteration in range(most):
         for run in runs:
@@ -116,41 +156,18 @@ def fit(
         linears = [problem.linearise(run, vector, columns, fresh=renew) for run in runs]
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)
+        if best is not None and not kept[0] < WORSE * best[0][0]:
+            kept, first, linears = best  # slopes there say that the last step was none
+            restore(kept)
+            refused += 1
+            if refused == REFUSALS:
+                break
+            damping = max(100 * damping, 1e-2)
+        elif renew:
+            best, refused = (kept, first, linears), 0
         before, promise, settled = kept[0], np.inf, False
         while np.isfinite(before) and damping < STEEPEST:
-            current, cost, shown = first, before, linears
-            for chord in range(CHORDS):
-                _, pull, precision = freedom.prior(vector)
-                matrix, pull = current.matrix + np.diag(precision), current.vector + pull
-                matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-300)
-                step = bounded(matrix, pull, freedom.lowest - vector[columns])
-                if not np.isfinite(step).all():
-                    cost = np.inf
-                    break
-                if chord == 0:
-                    promise = current.promise + float(pull @ step)
-                here = [run.starts.copy() for run in runs]
-                problem.move_starts(current, step)
-                vector[columns] += step
-                with np.errstate(all="ignore"):
-                    before_step = shown
-                    shown = [problem.refresh(r, vector, part) for r, part in zip(runs, linears, strict=True)]
-                    if horizon == 1:
-                        shown = [
-                            held_back(problem, run, vector, *parts)
-                            for run, *parts in zip(runs, here, before_step, shown, strict=True)
-                        ]
-                    current = condensed(shown)
-                new = current.cost + prior(vector)
-                if not np.isfinite(new):
-                    cost = np.inf
-                    break
-                settled = abs(cost - new) < 0.1 * tolerance * current.count
-                cost = new
-                if cost < kept[0]:
-                    kept = keep(cost, current)
-                if settled or cost > 100 * before:
-                    break
+            kept, promise, settled = chords(kept, first, linears, damping)
             if kept[0] < before:
                 damping = damping / 10 if damping > 1e-4 else 0.0
                 break
@@ -164,7 +181,7 @@ def fit(
         if gain == 0:
             damping = 0.0  # of slopes that did not hold
         if iteration < iterations and any([problem.mend(run, vector) for run in runs]):
-            renew = True
+            renew, best = True, None
             continue
         small = tolerance * first.count
         held = settled and abs(promise - gain) < max(FAITHFUL * gain, small)

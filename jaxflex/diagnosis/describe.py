@@ -16,6 +16,7 @@ from .adopt import without
 from .catalogue import RIGID_SIGN, SIGN, Candidate
 from .departure import departures, is_bent
 from .estimates import estimated
+from .find import MOST_EFFECTS
 from .foretell import AT_FLOOR, Foretold, foretell
 from .hypothesis import CLOSE, Hypothesis, Outcome, Search
 from .locate import LatentForce, regimes
@@ -97,9 +98,10 @@ def lacking(search: Search, outcome: Outcome) -> list[LatentForce]:
 
 
 def _verdict(outcome: Outcome, left: float, gone: float) -> str:
+    """What was found, by what is left and the share that has gone; effects enough to imitate anything name nothing."""
     if not outcome.final.effects:
         return "nothing_missing" if left < AT_FLOOR else "unexplained"
-    if left > AT_FLOOR and gone < MOSTLY:
+    if left > AT_FLOOR and (gone < MOSTLY or len(outcome.final.effects) == MOST_EFFECTS):
         return "unexplained"
     return "ambiguous" if outcome.rivals else "missing_effect"
 

@@ -196,6 +196,8 @@ class Search:
             if found is not None:
                 for run in self.runs:
                     self.problem.join(run, vector)
+                if self.parameters.plays:
+                    self.settle(vector, horizon)
             starts = self.starts()
             longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)
             if found is not None and not longer.level < RUNAWAY * (1 + found.level):

@@ -8,6 +8,8 @@ nothing else explains what was measured.
 import dataclasses
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .adopt import adopt
@@ -67,14 +69,14 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         for contact, candidate, sizes in ((SPRING, spring, COMPLIANCES), (FLANKS, play, GAPS)):
             study = Study(loosened(other.file, joint, contact), recordings, other.held_out, other.search.say)
             few = study.search.thinned()
-            fitted, size = best_from(few, candidate, sizes)
+            fitted = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
-            tried.append((study, few, fitted, size))
+            tried.append((study, few, fitted))
             if other.file.arm.links and fitted.fit.level < GONE:
                 break
-        study, few, fitted, size = min(tried, key=lambda entry: entry[2].fit.cost)
+        study, few, fitted = min(tried, key=lambda entry: entry[2].fit.cost)
         if joined(few, fitted, other).closest < most:
-            found.append((study, best_from(study.search, fitted.effects[0], [size])[0]))
+            found.append((study, in_full(study.search, fitted)))
     return found
 
 
@@ -90,10 +92,8 @@ def joined(search: Search, loose: Hypothesis, other: Study) -> Hypothesis:
     return search.climb((*loose.effects, *others), vector, to=1) if others else loose
 
 
-def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> tuple[Hypothesis, float]:
+def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> Hypothesis:
     """The candidate fitted from the best of some sizes: with its contact as guessed, then with everything.
-
-    And that size.
 
     From the parameters as stated: a misfit that a loose joint leaves bends them.
     """
@@ -105,14 +105,32 @@ def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> t
     for size in sizes:
         search.restart(starts)
         with_it = adopt(search.parameters, stated, candidate, (size,))
-        if candidate.effect == "backlash":
-            press(search.problem, search.runs, with_it, candidate.index)
-        search.settle(with_it)
-        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts(), size))
-    best, starts, size = min(begun, key=lambda entry: entry[0].cost)
+        _settle(search, candidate, with_it)
+        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts()))
+    best, starts = min(begun, key=lambda entry: entry[0].cost)
     search.restart(starts)
-    fitted = search.climb((candidate,), best.vector, to=1, iterations=8)
-    return (turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted), size
+    return _climb(search, candidate, best.vector)
+
+
+def in_full(search: Search, fitted: Hypothesis) -> Hypothesis:
+    """What was fitted to a part of the pieces, fitted to all of them."""
+    (candidate,) = fitted.effects
+    search.settle(search.parameters.start)
+    _settle(search, candidate, fitted.fit.vector)
+    if candidate.effect == "backlash":
+        choose_flanks(search.problem, search.runs, fitted.fit.vector, candidate.index, LOST_PIECE)
+    return _climb(search, candidate, fitted.fit.vector)
+
+
+def _settle(search: Search, candidate: Candidate, vector: np.ndarray) -> None:
+    if candidate.effect == "backlash":
+        press(search.problem, search.runs, vector, candidate.index)
+    search.settle(vector)
+
+
+def _climb(search: Search, candidate: Candidate, vector: np.ndarray) -> Hypothesis:
+    fitted = search.climb((candidate,), vector, to=1, iterations=8)
+    return turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted
 
 
 def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:

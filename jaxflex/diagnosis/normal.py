@@ -31,6 +31,7 @@ class Normal:
         )
 
 
+@np.errstate(over="ignore")  # slopes of a lost motion have no bounds; what cannot be solved is infinite
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """`matrix^-1 right` of a symmetric matrix, or the smallest of its solutions where it is singular."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))

@@ -75,19 +75,22 @@ def scores(
     base = slice(0, columns)
     matrix = normal.matrix[base, base] + np.diag(prior)
     vector = normal.vector[base] + pull
-    solved = solve(matrix, np.column_stack([normal.matrix[base], vector]))
     found = []
-    for candidate, place in zip(candidates, places, strict=True):
-        cross = normal.matrix[place, base]
-        own = normal.matrix[place, place]
-        inner = own - cross @ solved[:, :-1][:, place]
-        right = normal.vector[place] - cross @ solved[:, -1]
-        scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
-        tidy = inner / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-        if not np.isfinite(tidy).all():
-            continue
-        inverse = np.linalg.pinv(tidy, hermitian=True) / np.outer(scale, scale)
-        step = inverse @ right
-        survival = float(np.sqrt(np.clip(np.diag(tidy), 0, None).max()))
-        found.append(Score(candidate, float(right @ step), tuple(step), survival))
+    with np.errstate(all="ignore"):  # slopes of a lost motion have no bounds
+        solved = solve(matrix, np.column_stack([normal.matrix[base], vector]))
+        for candidate, place in zip(candidates, places, strict=True):
+            cross = normal.matrix[place, base]
+            own = normal.matrix[place, place]
+            inner = own - cross @ solved[:, :-1][:, place]
+            right = normal.vector[place] - cross @ solved[:, -1]
+            scale = np.sqrt(np.maximum(np.diag(own), 1e-300))
+            tidy = inner / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+            if not np.isfinite(tidy).all():
+                continue
+            step = np.linalg.pinv(tidy, hermitian=True) / np.outer(scale, scale) @ right
+            gain = float(right @ step)
+            if not np.isfinite(gain):
+                continue
+            survival = float(np.sqrt(np.clip(np.diag(tidy), 0, None).max()))
+            found.append(Score(candidate, gain, tuple(step), survival))
     return found

@@ -32,7 +32,7 @@ def study():
 
 @pytest.mark.parametrize("size", [GAP / 3, 3 * GAP])
 def test_play_is_found_from_a_third_and_from_three_times_its_size(study, size):
-    found, _ = best_from(study.search, PLAY, (size,))
+    found = best_from(study.search, PLAY, (size,))
     place = study.search.parameters.position("backlash", "joint_1", "gap")
     assert found.fit.level < 1.5
     np.testing.assert_allclose(found.fit.vector[place], GAP, rtol=0.03)
