@@ -164,25 +164,36 @@ def _blackman_harris(length: int) -> np.ndarray:
 
 
 def _colour(rest: Sequence[np.ndarray], resolution: float) -> tuple[float, ...]:
-    """Auto-regressive model of the noise at rest, by Yule-Walker; the order by BIC, empty for white."""
-    parts = [part - part.mean() for part in rest]
-    count = sum(len(part) for part in parts)
-    if count == 0:
-        return ()
-    moments = [
-        sum(part[lag:] @ part[: len(part) - lag] for part in parts) / count for lag in range(ORDER + 1)
-    ]
-    if moments[0] <= resolution**2 / 12:
-        return ()
-    best, chosen = count * math.log(moments[0]), ()
-    for order in range(1, ORDER + 1):
-        matrix = np.array([[moments[abs(i - j)] for j in range(order)] for i in range(order)])
-        ar = np.linalg.solve(matrix, moments[1 : order + 1])
-        innovation = moments[0] - ar @ moments[1 : order + 1]
-        criterion = count * math.log(max(innovation, 1e-300)) + order * math.log(count)
-        if criterion < best:
-            best, chosen = criterion, tuple(float(a) for a in ar)
+    """Auto-regressive model of the noise at rest, by Yule-Walker; the order by BIC, empty for white.
+
+    An arm that a constant force has begun to move, or an instrument that drifts, is not noise with colour:
+    BIC says too whether each part has a course of the second degree.
+    """
+    count = sum(len(part) for part in rest)
+    best, chosen = np.inf, ()
+    for degree in (0, 2):
+        parts = [part - _course(part, degree) for part in rest]
+        moments = [
+            sum(part[lag:] @ part[: len(part) - lag] for part in parts) / max(count, 1)
+            for lag in range(ORDER + 1)
+        ]
+        if moments[0] <= resolution**2 / 12:
+            return ()
+        for order in range(ORDER + 1):
+            matrix = np.array([[moments[abs(i - j)] for j in range(order)] for i in range(order)])
+            ar = np.linalg.solve(matrix, moments[1 : order + 1]) if order else np.zeros(0)
+            innovation = moments[0] - ar @ moments[1 : order + 1]
+            terms = order + degree * len(parts)
+            criterion = count * math.log(max(innovation, 1e-300)) + terms * math.log(count)
+            if criterion < best:
+                best, chosen = criterion, tuple(float(a) for a in ar)
     return chosen
+
+
+def _course(part: np.ndarray, degree: int) -> np.ndarray:
+    """The polynomial of this degree that is nearest to what was measured."""
+    time = np.linspace(-1, 1, len(part))
+    return np.polyval(np.polyfit(time, part, degree), time)
 
 
 def _response(ar: tuple[float, ...], omega: np.ndarray) -> np.ndarray:

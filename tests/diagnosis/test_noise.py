@@ -61,6 +61,15 @@ def test_rest_shows_the_colour(a, seed):
     assert floor.innovation == pytest.approx(2e-4 * np.sqrt(1 - a**2), rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_an_arm_that_begins_to_fall_is_not_noise_with_colour(seed):
+    """A constant force moves it by 50 times the noise before its input does."""
+    fallen = 5e-3 * (np.arange(5000) / 100) ** 2
+    values = fallen + 1e-4 * np.random.default_rng(seed).normal(size=5000)
+    floor = noise_floor(values, rest=[values[:100]])
+    assert floor.ar == () and floor.std == pytest.approx(1e-4, rel=0.06)
+
+
 def test_without_rest_noise_of_low_frequency_is_underestimated():
     """A limit of the method, as its docstring says."""
     floor = noise_floor(motion() + coloured(0.8, 5000, 2e-4, 0))
