@@ -26,6 +26,7 @@ from .hypothesis import (
 from .rivals import prune
 
 MOST_EFFECTS = 5
+FURTHER = HORIZONS[1]  # over which parts of the arm are told apart, where the motion is followed so long
 SHORT_LIST = 3
 PAIR = 2  # of the short list that are tried two at a time
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
@@ -132,7 +133,10 @@ def next_effect(
     if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
         search.restart(base_starts)
         stated, stated_starts = straightened(search, base)
-        confirm(sift(search, stated, stated_starts, search.parts(stated.effects)), stated, stated_starts)
+        likely = sift(
+            search, stated, stated_starts, search.parts(stated.effects), min(fitted.horizon, FURTHER)
+        )
+        confirm(likely, stated, stated_starts)
     confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
     if not confirmed:
         return None
@@ -210,35 +214,44 @@ def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
     return settled_at(search, base.effects, vector)
 
 
-def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked]) -> list[Ranked]:
-    """The few that explain most over the shortest horizon, each fitted in full.
+def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked], horizon: int) -> list[Ranked]:
+    """The few that explain most over `horizon`, each fitted in full.
 
-    Parameters that were bent to imitate an effect mislead a test to first order. A part of the pieces
-    says as well as all which of them it is, and one set of slopes which of them it is not, unless
-    what it comes to is worse than nothing added.
+    Parameters that were bent to imitate an effect mislead a test to first order. Over the shortest horizon
+    a part of the pieces says as well as all which of them it is.
     """
     search.restart(starts)
-    few = search.thinned()
-    wanted = [freedom(few.parameters, (*base.effects, item.candidate)).columns for item in items]
+    if horizon == HORIZONS[0]:
+        search = search.thinned()
+        starts = search.starts()
+        items = _likely(search, base, items)
+    best: dict[tuple[str, str], tuple[float, Ranked]] = {}
+    for item in items:
+        cost = search.confirm(base, starts, item, horizon).costs.get(horizon, np.inf)
+        if item.candidate.key not in best or cost < best[item.candidate.key][0]:
+            best[item.candidate.key] = cost, item
+    search.restart(starts)
+    nothing = search.climb(base.effects, base.fit.vector, to=horizon).costs.get(horizon, np.inf)
+    ranked = sorted(best.values(), key=lambda entry: entry[0])[:SHORT_LIST]
+    return [item for cost, item in ranked if nothing - cost >= NEAR * (nothing - ranked[0][0])]
+
+
+def _likely(search: Search, base: Hypothesis, items: list[Ranked]) -> list[Ranked]:
+    """Those that may be among the best over the shortest horizon.
+
+    One set of slopes says which of them it is not, unless what it comes to is worse than nothing added.
+    """
+    wanted = [freedom(search.parameters, (*base.effects, item.candidate)).columns for item in items]
     columns = sorted(set(itertools.chain.from_iterable(wanted)))
-    for run in few.runs:
-        few.problem.linearise(run, base.fit.vector, columns)
-    starts = few.starts()
-    once = few.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
-    quick = [few.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
+    for run in search.runs:
+        search.problem.linearise(run, base.fit.vector, columns)
+    starts = search.starts()
+    once = search.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
+    quick = [search.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
     order = sorted(zip(quick, items, strict=True), key=lambda entry: entry[0])
     limit = once.cost + once.count * WORSE
     likely = [item for cost, item in order if cost <= limit][: 2 * SHORT_LIST]
-    failed = [item for cost, item in order if not cost <= limit]
-    best: dict[tuple[str, str], tuple[float, Ranked]] = {}
-    for item in (*likely, *failed):
-        cost = few.confirm(base, starts, item, HORIZONS[0]).fit.cost
-        if item.candidate.key not in best or cost < best[item.candidate.key][0]:
-            best[item.candidate.key] = cost, item
-    few.restart(starts)
-    nothing = few.climb(base.effects, base.fit.vector, to=HORIZONS[0]).fit.cost
-    ranked = sorted(best.values(), key=lambda entry: entry[0])[:SHORT_LIST]
-    return [item for cost, item in ranked if nothing - cost >= NEAR * (nothing - ranked[0][0])]
+    return [*likely, *(item for cost, item in order if not cost <= limit)]
 
 
 def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:

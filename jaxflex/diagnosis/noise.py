@@ -173,10 +173,8 @@ def _colour(rest: Sequence[np.ndarray], resolution: float) -> tuple[float, ...]:
     best, chosen = np.inf, ()
     for degree in (0, 2):
         parts = [part - _course(part, degree) for part in rest]
-        moments = [
-            sum(part[lag:] @ part[: len(part) - lag] for part in parts) / max(count, 1)
-            for lag in range(ORDER + 1)
-        ]
+        products = [sum(part[lag:] @ part[: len(part) - lag] for part in parts) for lag in range(ORDER + 1)]
+        moments = np.array(products) / max(count, 1)
         if moments[0] <= resolution**2 / 12:
             return ()
         for order in range(ORDER + 1):
