@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +14,8 @@ import jaxflex as jf
 from controllers import Replayed, Step
 from experiments.blind.make import make_cases, write_case
 from jaxflex.diagnosis import diagnose
+from jaxflex.diagnosis.catalogue import Candidate
+from jaxflex.diagnosis.diagnose import _has_not_seen
 from jaxflex.diagnosis.gauge import by_gauge
 from jaxflex.diagnosis.hypothesis import Outcome, Search
 from jaxflex.diagnosis.parameters import _nominal
@@ -115,6 +118,22 @@ def test_what_shows_at_the_end_alone_is_named():
     assert [effect.name for effect in found.effects] == ["voltage_saturation"]
     assert found.effects[0].parameters["limit"].value == pytest.approx(2.2, rel=0.02)
     assert found.gap.after["angle_1"] < 1.2 * found.gap.noise_floor["angle_1"]
+
+
+@pytest.mark.parametrize(
+    "searched, held_out, named, seen",
+    [(1.0, 1.03, False, True), (0.9, 1.0, False, False), (1.0, 1.5, True, True), (1.0, 2.5, True, False)],
+)
+def test_a_small_gap_in_what_is_held_out_counts_where_nothing_was_named(
+    recorded, monkeypatch, searched, held_out, named, seen
+):
+    study = Study(*recorded(), HeldOut.ENDS, lambda line: None)
+    final = study.search.climb((), study.search.parameters.start, to=1)
+    final.effects = (Candidate("quadratic_drag", "joint_1", ("coefficient",)),) * named
+    study.outcome = Outcome(final, [], 10.0)
+    study.outcome.level = searched
+    monkeypatch.setattr(study, "foretold", lambda: SimpleNamespace(level=held_out))
+    assert _has_not_seen(study) is not seen
 
 
 def test_nothing_hidden_is_nothing_missing(hidden):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.find import _short_list, confirmed_from
-from jaxflex.diagnosis.hypothesis import CLOSE, Ranked, Search
-from jaxflex.effects import StribeckFriction
+from jaxflex.diagnosis.find import FURTHER, _short_list, confirmed_from, settled_at, sift
+from jaxflex.diagnosis.hypothesis import CLOSE, HORIZONS, Ranked, Search
+from jaxflex.effects import StribeckFriction, ViscousFriction
 
 SHAPE = (("stribeck_rate", 0.3), ("presliding", 1e-4))
 STRIBECK = Candidate(
@@ -56,3 +56,12 @@ def test_what_stands_out_at_one_horizon_does_not_hide_what_does_at_another():
         ]
     ]
     assert [item.candidate for item in _short_list(items)] == [COULOMB, DRAG]
+
+
+@pytest.mark.parametrize("horizon", [HORIZONS[0], FURTHER])
+def test_a_small_change_of_a_part_is_the_likeliest(swung, horizon):
+    search = swung(ViscousFriction(2e-5))
+    base, starts = settled_at(search, (), search.parameters.start)
+    likeliest = sift(search, base, starts, search.parts(()), horizon)
+    assert likeliest[0].candidate.effect == "viscous_friction"
+    assert all(run.stride == 1 for run in search.runs)

@@ -7,6 +7,7 @@ import pytest
 
 from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
+from jaxflex.diagnosis.hypothesis import HORIZONS
 from jaxflex.diagnosis.loose_joint import FLANKS, best_from, loosened
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
@@ -36,6 +37,9 @@ def test_play_is_found_from_a_third_and_from_three_times_its_size(study, size):
     place = study.search.parameters.position("backlash", "joint_1", "gap")
     assert found.fit.level < 1.5
     np.testing.assert_allclose(found.fit.vector[place], GAP, rtol=0.03)
+    over_a_second = study.search.climb(found.effects, found.fit.vector)
+    assert over_a_second.horizon == HORIZONS[-1] and over_a_second.fit.level < 1.1
+    np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.01)
 
 
 def test_harder_flanks_take_more_steps(study):

@@ -3,6 +3,9 @@
 import numpy as np
 
 from jaxflex.diagnosis.calibrate import Fit, Freedom
+from jaxflex.diagnosis.catalogue import Candidate
+from jaxflex.diagnosis.describe import _verdict
+from jaxflex.diagnosis.find import MOST_EFFECTS
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
 from jaxflex.diagnosis.normal import Normal
 
@@ -47,3 +50,13 @@ def test_an_effect_that_is_dropped_takes_its_gain_and_its_rivals_along():
     assert found.final is rival
     assert found.gains == [1.0, 3.0]
     assert [place for place, _ in found.rivals] == [0, 1]
+
+
+def test_effects_enough_to_imitate_anything_explain_nothing_that_is_left():
+    found = outcome(fitted(5e3, 5e3, 5e3), 1e3, 5.0)
+    effect = Candidate("quadratic_drag", "joint_1", ("coefficient",))
+    verdicts = []
+    for count in (1, MOST_EFFECTS):
+        found.final.effects = (effect,) * count
+        verdicts += [_verdict(found, 5.0, gone=0.996), _verdict(found, 1.1, gone=0.999)]
+    assert verdicts == ["missing_effect", "missing_effect", "unexplained", "missing_effect"]
