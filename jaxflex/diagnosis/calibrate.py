@@ -89,7 +89,8 @@ def fit(
     `fresh`, they are taken anew at the end; with `most` of 1 they are never. Ends when slopes
     that hold have nothing more to gain, when an iteration gains less than `tolerance` a reading,
     or, after `iterations` of them, less than the share SLOW of the cost. Pieces that run away in
-    a step stay where they were.
+    a step stay where they were; over longer horizons, whose cost rests on the slopes, an iteration
+    that the next slopes belie is taken back and tried again with more damping.
     """
     vector = vector.copy()
     columns = list(freedom.columns)
@@ -138,11 +139,10 @@ def fit(
             if not np.isfinite(new):
                 break
             settled = abs(cost - new) < 0.1 * tolerance * current.count
-            diverges = new > 100 * before
             cost = new
             if cost < kept[0]:
                 kept = keep(cost, current)
-            if settled or diverges:
+            if settled or cost > 100 * before:
                 break
         return kept, promise, settled
 

@@ -20,7 +20,7 @@ from .shooting import Problem, Run
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece
-RUNAWAY = 1e6  # rad/s: beyond it a motion is lost
+FASTEST = 1e6  # rad/s: beyond it a motion is lost
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def latent_forces(problem: Problem, run: Run, vector: np.ndarray, horizon: int) 
         rate = motion.rate(joint).mean(0)[:, middle].ravel()
         times = motion.time[:, middle].ravel()
         values = values.ravel()
-        followed = np.isfinite(rate) & (np.abs(rate) < RUNAWAY) & np.isfinite(angle) & np.isfinite(values)
+        followed = np.isfinite(rate) & (np.abs(rate) < FASTEST) & np.isfinite(angle) & np.isfinite(values)
         values, angle, rate = (np.where(followed, part, 0.0) for part in (values, angle, rate))
         acceleration = np.gradient(rate, times)
         inside = times <= run.times[-1]

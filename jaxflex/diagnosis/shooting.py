@@ -101,6 +101,7 @@ class Problem:
         self._moves_model = [True] * len(setting.parameters.nominal) + [e.index is not None for e in effects]
         bent = len(setting.start_spread) - len(setting.channels)
         self._bristles = slice(bent - len(setting.parameters.arm.joints), bent)
+        self._stepping: tuple[np.ndarray, Stepping] | None = None  # the last that was asked for
         self._model = eqx.filter_jit(assembled)
         self._tangents = eqx.filter_jit(jax.vmap(along, (None, 0)))
         self._delay = [
@@ -117,6 +118,11 @@ class Problem:
 
     def stepping(self, vector: np.ndarray) -> Stepping:
         """How a sample interval is integrated for these parameters."""
+        if self._stepping is None or not np.array_equal(self._stepping[0], vector):
+            self._stepping = vector.copy(), self._stepping_of(vector)
+        return self._stepping[1]
+
+    def _stepping_of(self, vector: np.ndarray) -> Stepping:
         parameters = self.setting.parameters
         dry, joints = parameters.has_dry_friction(vector), len(parameters.lightness)
         substeps = self.setting.substeps
