@@ -17,7 +17,7 @@ FAITHFUL = 0.1  # of a fall of the cost: slopes that foretell it better than tha
 SLOW = 0.03  # share of the cost that an iteration has to gain to be followed by more than was asked for
 WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
-WORSE = 1.5  # growth of the cost over an iteration, as the next slopes see it, at which it is taken back
+BELIED = 1.5  # growth of the cost over an iteration, as the next slopes see it, at which it is taken back
 REFUSALS = 3  # in a row, at which a fit ends
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
@@ -156,7 +156,7 @@ def fit(
         linears = [problem.linearise(run, vector, columns, fresh=renew) for run in runs]
         first = condensed(linears)
         kept = keep(first.cost + prior(vector), first)
-        if best is not None and not kept[0] < WORSE * best[0][0]:
+        if best is not None and not kept[0] < BELIED * best[0][0]:
             kept, first, linears = best  # slopes there say that the last step was none
             restore(kept)
             refused += 1

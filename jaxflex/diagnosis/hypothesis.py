@@ -196,7 +196,7 @@ class Search:
             if found is not None:
                 for run in self.runs:
                     self.problem.join(run, vector)
-                if self.parameters.plays:
+                if self.parameters.plays:  # where a contact opens and shuts, only slopes near it hold
                     self.settle(vector, horizon)
             starts = self.starts()
             longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .adopt import amplitudes_of, without
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Outcome, Ranked, Search
+from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Outcome, Ranked, Search, Starts
 from .loose_joint import is_of_loose_joint
 
 MOST = 2  # rivals of an effect that are tried
@@ -55,8 +55,7 @@ def weigh(search: Search, outcome: Outcome) -> None:
         for item, share in (*found, *((item, item.gain) for item in close[:MOST])):
             vector = without(search.parameters, final.fit.vector, effect)
             base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
-            search.restart(starts)
-            if outcome.nominal.closest > hopeless and not _promises(search, base, item, hopeless):
+            if outcome.nominal.closest > hopeless and not _promises(search, base, starts, item, hopeless):
                 continue
             rival = search.confirm(base, starts, item, final.horizon, ceiling=hopeless)
             if rival.horizon != final.horizon or not search.sensible(rival):
@@ -91,8 +90,9 @@ def weigh(search: Search, outcome: Outcome) -> None:
     search.restart(outcome.final_starts)
 
 
-def _promises(search: Search, base: Hypothesis, item: Ranked, limit: float) -> bool:
+def _promises(search: Search, base: Hypothesis, starts: Starts, item: Ranked, limit: float) -> bool:
     """True if a part of the pieces leaves a candidate that is added to `base` less than `limit`."""
+    search.restart(starts)
     few = search.thinned()
     return few.confirm(base, few.starts(), item, HORIZONS[0]).closest < limit
 
