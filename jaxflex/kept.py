@@ -58,17 +58,18 @@ def kept(function: Callable, **options: Any) -> Callable:
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore
-        arrays, constants = eqx.partition((args, named), _is_array)
-        leaves, tree = jtu.tree_flatten(arrays)
+        everything, tree = jtu.tree_flatten((args, named))
+        leaves = [leaf for leaf in everything if _is_array(leaf)]
         debugging = any(getattr(jax.config, name) for name in DEBUGGING)
         if folder is None or debugging or any(_is_elsewhere(leaf) for leaf in leaves):
             return plain(*args, **named)
-        fixed, form = jtu.tree_flatten(constants)
+        fixed = tuple(Slot if _is_array(leaf) else leaf for leaf in everything)
         kinds = tuple((leaf.shape, leaf.dtype, _is_weak(leaf)) for leaf in leaves)
-        key = (tree, form, tuple(fixed), kinds, folder, _settings())
+        key = (tree, fixed, kinds, folder, _settings())
 
         def flat(*leaves):
-            given, called = eqx.combine(jtu.tree_unflatten(tree, leaves), constants)
+            arrays = iter(leaves)
+            given, called = jtu.tree_unflatten(tree, [next(arrays) if p is Slot else p for p in fixed])
             return function(*given, **called)
 
         if key not in programs:
@@ -113,7 +114,8 @@ def _is_elsewhere(leaf: Any) -> bool:
         return True
     if not isinstance(leaf, jax.Array):
         return False
-    return [device.platform for device in leaf.devices()] != [jax.default_backend()]
+    devices = leaf.devices()
+    return len(devices) != 1 or next(iter(devices)).platform != jax.default_backend()
 
 
 def _program(flat: Callable, shapes: list, file: Path, options: dict) -> Callable:

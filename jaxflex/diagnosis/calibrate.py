@@ -9,7 +9,8 @@ import numpy as np
 
 from .chains import Linearised
 from .normal import Normal, solve
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 CHORDS = 5  # steps with the same slopes; each needs only a run of the model
 MOST = 15  # iterations, however well they do

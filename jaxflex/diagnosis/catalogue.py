@@ -21,7 +21,8 @@ from ..effects import EFFECTS, AbstractDryFriction, AbstractEffect, AbstractJoin
 from ..files.arm_file import places
 from .parameters import Parameters
 from .plant import bristles
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.0  # of a ripple that the motion must span

@@ -18,10 +18,11 @@ from .departure import departures, is_bent
 from .estimates import estimated
 from .find import MOST_EFFECTS
 from .foretell import AT_FLOOR, Foretold, foretell
-from .hypothesis import CLOSE, Hypothesis, Outcome, Search
+from .hypothesis import CLOSE, Hypothesis, Search
 from .locate import LatentForce, regimes
 from .loose_joint import is_of_loose_joint
 from .next_experiment import advice
+from .outcome import Outcome
 from .parameters import Parameters
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem

@@ -16,13 +16,13 @@ from .hypothesis import (
     PARTS,
     STRONG,
     Hypothesis,
-    Outcome,
     Ranked,
     Search,
     Starts,
     form_error,
     freedom,
 )
+from .outcome import Outcome
 from .rivals import prune
 
 MOST_EFFECTS = 5
@@ -70,6 +70,7 @@ def calibrated(search: Search, base: Hypothesis, starts: Starts) -> tuple[Hypoth
 
 
 def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts) -> None:
+    outcome.passed[outcome.final.effects] = outcome.final, outcome.final_starts
     outcome.final, outcome.final_starts = calibrated(search, base, starts)
     outcome.level = search.over_a_second(outcome.final)
 
@@ -118,7 +119,9 @@ def next_effect(
 
     def confirm(items: list[Ranked], before: Hypothesis, before_starts: Starts) -> None:
         for item in items:
-            found, found_starts = confirmed_from(search, before, before_starts, item, fitted.horizon)
+            found, found_starts = confirmed_from(
+                search, before, before_starts, item, fitted.horizon, without=fitted
+            )
             search.say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
             if search.sensible(found):
                 confirmed.append((found.strength(fitted, explained), found, found_starts))
@@ -130,13 +133,16 @@ def next_effect(
             first, first_starts = adopted(search, base, base_starts, item)
             more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
             confirm(_short_list(more)[:PAIR], first, first_starts)
-    if suspect and not (confirmed and decisive(search, fitted, simplest(search, confirmed)[1])):
-        search.restart(base_starts)
-        stated, stated_starts = straightened(search, base)
-        likely = sift(
-            search, stated, stated_starts, search.parts(stated.effects), min(fitted.horizon, FURTHER)
-        )
-        confirm(likely, stated, stated_starts)
+    chosen = simplest(search, confirmed) if suspect and confirmed else None
+    if suspect and not (chosen and decisive(search, fitted, chosen[1])):
+        changes = search.parts(base.effects)
+        if chosen and is_enough(search, chosen[1], outcome.explained):
+            changes = imitating(search, chosen, changes)
+        if changes:
+            search.restart(base_starts)
+            stated, stated_starts = straightened(search, base)
+            likely = sift(search, stated, stated_starts, changes, min(fitted.horizon, FURTHER))
+            confirm(likely, stated, stated_starts)
     confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
     if not confirmed:
         return None
@@ -149,18 +155,23 @@ def next_effect(
 
 
 def confirmed_from(
-    search: Search, before: Hypothesis, starts: Starts, item: Ranked, to: int
+    search: Search,
+    before: Hypothesis,
+    starts: Starts,
+    item: Ranked,
+    to: int,
+    without: Hypothesis | None = None,
 ) -> tuple[Hypothesis, Starts]:
-    """The candidate added to `before` in full, and where its pieces start.
+    """The candidate added to `before` in full, and where its pieces start; `without` as for `climb`.
 
     One that takes the place of another is fitted from the stated parameters as well: what the other
     bent them to is no good place to begin.
     """
-    found, found_starts = search.confirm(before, starts, item, to), search.starts()
+    found, found_starts = search.confirm(before, starts, item, to, without=without), search.starts()
     if before.fit.level > CLOSE and {effect.key for effect in before.effects} & held_by(item.candidate):
         search.restart(starts)
         stated, stated_starts = straightened(search, before)
-        other = search.confirm(stated, stated_starts, item, to)
+        other = search.confirm(stated, stated_starts, item, to, without=without)
         if other.strength(found) > 0:
             return other, search.starts()
     return found, found_starts
@@ -188,7 +199,30 @@ def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
         return False  # another part of the arm could be meant
     if before.fit.level > FAR and best.fit.level < HALFWAY * before.fit.level:
         return True
-    return best.fit.level < FAIR and not is_suspect(search.parameters, best)
+    return is_enough(search, best)
+
+
+def is_enough(search: Search, found: Hypothesis, explained: float = 0.0) -> bool:
+    """True if nothing is left over the horizon of the fit, and no parameter went too far (`is_suspect`)."""
+    return found.fit.level < FAIR and not is_suspect(search.parameters, found, explained)
+
+
+def imitating(search: Search, confirmed: Confirmed, parts: list[Ranked]) -> list[Ranked]:
+    """Of the parts of the arm those that could do nearly what the last effect of a hypothesis does.
+
+    Where that effect is enough, parameters are bent so little that a test to first order says so.
+    """
+    _, found, starts = confirmed
+    search.restart(starts)
+    own = found.effects[-1]
+    ranked = search.rank(found.fit.vector, found.effects, (found.horizon,), instead=own)
+    gains = {item.candidate.key: item.gain for item in ranked}
+    least = NEAR * gains.get(own.key, 0.0)
+    return [
+        part
+        for part in parts
+        if part.candidate.key != own.key and gains.get(part.candidate.key, 0.0) >= least
+    ]
 
 
 def adopted(search: Search, base: Hypothesis, starts: Starts, item: Ranked) -> tuple[Hypothesis, Starts]:
@@ -217,23 +251,35 @@ def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
 def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked], horizon: int) -> list[Ranked]:
     """The few that explain most over `horizon`, each fitted in full.
 
-    Parameters that were bent to imitate an effect mislead a test to first order. Over the shortest horizon
-    a part of the pieces says as well as all which of them it is.
+    Parameters that were bent to imitate an effect mislead a test to first order. A part of the pieces
+    says as well as all which of them it is.
     """
     search.restart(starts)
+    search = search.thinned(horizon)
+    starts = search.starts()
+    nothing = search.climb(base.effects, base.fit.vector, to=horizon)
     if horizon == HORIZONS[0]:
-        search = search.thinned()
-        starts = search.starts()
+        search.restart(starts)
         items = _likely(search, base, items)
+    elif nothing.horizon == horizon and nothing.fit.level < CLOSE:
+        items = _promising(search, nothing, items)
     best: dict[tuple[str, str], tuple[float, Ranked]] = {}
     for item in items:
-        cost = search.confirm(base, starts, item, horizon).costs.get(horizon, np.inf)
+        found = search.confirm(base, starts, item, horizon, without=nothing)
+        cost = found.costs.get(horizon, np.inf)
         if item.candidate.key not in best or cost < best[item.candidate.key][0]:
             best[item.candidate.key] = cost, item
-    search.restart(starts)
-    nothing = search.climb(base.effects, base.fit.vector, to=horizon).costs.get(horizon, np.inf)
+    left = nothing.costs.get(horizon, np.inf)
     ranked = sorted(best.values(), key=lambda entry: entry[0])[:SHORT_LIST]
-    return [item for cost, item in ranked if nothing - cost >= NEAR * (nothing - ranked[0][0])]
+    return [item for cost, item in ranked if left - cost >= NEAR * (left - ranked[0][0])]
+
+
+def _promising(search: Search, nothing: Hypothesis, items: list[Ranked]) -> list[Ranked]:
+    """Those that gain most to first order, where a hypothesis that leaves little is fitted without them."""
+    tried = list(dict.fromkeys(item.candidate for item in items))
+    ranked = search.scored(nothing.fit.vector, nothing.effects, tried, (nothing.horizon,))
+    best = [one.candidate.key for one in ranked[: 2 * SHORT_LIST]]
+    return [item for item in items if item.candidate.key in best]
 
 
 def _likely(search: Search, base: Hypothesis, items: list[Ranked]) -> list[Ranked]:

@@ -6,7 +6,8 @@ No reading shows it, and a fit by slopes does not cross the gap: the other flank
 import numpy as np
 
 from .hypothesis import restart, settle, starts_of
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 
 def press(problem: Problem, runs: list[Run], vector: np.ndarray, joint: int) -> None:

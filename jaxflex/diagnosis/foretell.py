@@ -11,7 +11,8 @@ from .calibrate import Freedom, fit
 from .chains import whitened
 from .flanks import choose_flanks
 from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
-from .shooting import LOST_PIECE, Problem, Run
+from .runs import Run
+from .shooting import LOST_PIECE, Problem
 
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 

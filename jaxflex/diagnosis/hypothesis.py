@@ -14,8 +14,9 @@ from .calibrate import MOST, Fit, Freedom, fit
 from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
+from .runs import Run
 from .screen import scores, with_candidates
-from .shooting import Problem, Run, Slopes
+from .shooting import Problem, Slopes
 
 HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # A model is never the plant. What it gets wrong shows more the longer it runs, and is no
@@ -41,6 +42,7 @@ PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal paramet
 LEAST = 0.1  # of the value that a shape is begun with
 SHARPEST = 1e-3  # the same, of the way that friction bends over
 FARTHEST_REST = 2 * np.pi  # rad, of a cable
+ASTRAY = 2.0  # times what is left without an effect: a fit with it that leaves more has failed
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
@@ -167,9 +169,9 @@ class Search:
         self.parameters = problem.setting.parameters
         self.say = say
 
-    def thinned(self) -> "Search":
-        """The same search with one piece in SOME."""
-        return Search(self.problem, [run.thinned(SOME) for run in self.runs], self.say)
+    def thinned(self, together: int = 1) -> "Search":
+        """The same search with one in SOME of the pieces, for fits over `together` of them."""
+        return Search(self.problem, [run.thinned(SOME, together) for run in self.runs], self.say)
 
     def starts(self) -> Starts:
         """The starts of all pieces, with the slopes there, to come back to."""
@@ -185,9 +187,14 @@ class Search:
 
     def climb(
         self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],
-        iterations: int = 4, most: int = MOST,
+        iterations: int = 4, most: int = MOST, without: Hypothesis | None = None,
     ) -> Hypothesis:  # fmt: skip
-        """Fit over longer and longer horizons, stopping where the misfit is above `ceiling`; the rest as for `fit`."""
+        """Fit over longer and longer horizons; the rest as for `fit`.
+
+        Stops where the misfit is above `ceiling`, or far above that of the hypothesis `without` one of
+        the effects, which leaves no less unless the fit has gone astray.
+        """
+        known = {} if without is None else without.costs
         free = freedom(self.parameters, effects)
         found, costs = None, {}
         for horizon in HORIZONS:
@@ -205,7 +212,7 @@ class Search:
                 break
             found, vector = longer, longer.vector
             costs[horizon] = found.cost
-            if found.level > ceiling:
+            if found.level > ceiling or found.cost > ASTRAY * known.get(horizon, np.inf):
                 break
         assert found is not None
         return Hypothesis(effects, found, max(costs), costs)
@@ -236,18 +243,27 @@ class Search:
         along with each candidate. With `instead`, one of the effects, the candidates are
         judged as if that one were taken out; it is then among them itself.
         """
-        parameters = self.parameters
-        free = freedom(parameters, effects)
         frequencies = strongest_frequencies(self.latent(vector)[0], FREQUENCIES)
         if instead is not None and instead.effect == "periodic_disturbance":
             frequencies = [dict(instead.shape)["frequency"], *frequencies]
         motions = [Motion(self.problem, run, vector) for run in self.runs]
+        tried = list(candidates(self.parameters, motions, frequencies))
+        return self.scored(vector, effects, tried, horizons, instead)
+
+    def scored(
+        self,
+        vector: np.ndarray,
+        effects: tuple[Candidate, ...],
+        tried: list[Candidate],
+        horizons: tuple[int, ...],
+        instead: Candidate | None = None,
+    ) -> list[Ranked]:
+        """Those of the candidates `tried` that are not yet in `effects`; the rest as for `rank`."""
+        parameters = self.parameters
+        free = freedom(parameters, effects)
         taken = {effect.key for effect in effects if effect is not instead}
-        tried = [
-            rise(c) if taken & held_by(c) else c
-            for c in candidates(parameters, motions, frequencies)
-            if c.key not in taken
-        ]
+        tried = [rise(c) if taken & held_by(c) else c for c in tried if c.key not in taken]
+        motions = [Motion(self.problem, run, vector) for run in self.runs]
         columns = list(free.columns)
         own = [] if instead is None else self._own_places(columns, instead)
         linears = [
@@ -274,7 +290,8 @@ class Search:
                 candidate, step = score.candidate, score.step
                 if taken & held_by(candidate):
                     candidate, step = risen(parameters, vector, candidate, step)
-                if score.survival < INVISIBLE or not plausible(candidate, step):
+                is_there = instead is not None and candidate.key == instead.key
+                if not is_there and (score.survival < INVISIBLE or not plausible(candidate, step)):
                     continue
                 strength = score.gain / allowance(normal.count, horizon)
                 kept = best.get(candidate.key)
@@ -340,46 +357,11 @@ class Search:
         to: int,
         ceiling: float = np.inf,
         most: int = MOST,
+        without: Hypothesis | None = None,
     ) -> Hypothesis:
         """The candidate added to `base` in full, fitted from `starts`; the rest as for `climb`."""
         self.restart(starts)
         effects, vector = with_candidate(
             self.parameters, base.effects, base.fit.vector, ranked.candidate, ranked.step
         )
-        return self.climb(effects, vector, ceiling, to, most=most)
-
-
-class Outcome:
-    """What the search came to: the nominal fit, the final one, and rivals of each effect.
-
-    `level`: misfit a reading over the longest horizon; `nominal_level`: the same without any effect.
-    """
-
-    def __init__(self, nominal: Hypothesis, starts: Starts, level: float):
-        self.nominal = nominal
-        self.nominal_starts = starts
-        self.nominal_level = level
-        self.final = nominal
-        self.final_starts = starts
-        self.level = level
-        self.rivals: list[tuple[int, Hypothesis]] = []
-        self.close: dict[tuple[str, str], list[Ranked]] = {}  # what did as well when an effect was added
-        self.gains: list[float] = []
-
-    def drop(self, place: int, final: Hypothesis, starts: Starts) -> None:
-        """The effect at this place is no longer part of what was found, which is `final` without it."""
-        self.final, self.final_starts = final, starts
-        self.gains = [gain for at, gain in enumerate(self.gains) if at != place]
-        self.rivals = [(at - (at > place), rival) for at, rival in self.rivals if at != place]
-
-    @property
-    def explained(self) -> float:
-        """Cost over the longest horizon that the effects account for, 0 if the motion was lost there."""
-        gone = self.nominal_level - self.level
-        return gone * self.final.fit.count if np.isfinite(gone) else 0.0
-
-    def explained_over(self) -> dict[int, float]:
-        """Cost that the effects account for over every horizon, at least what they do over the shortest."""
-        short = self.nominal.costs[HORIZONS[0]] - self.final.costs[HORIZONS[0]]
-        longer = {h: max(short, h / HORIZONS[-1] * self.explained) for h in HORIZONS[1:]}
-        return {HORIZONS[0]: short} | longer
+        return self.climb(effects, vector, ceiling, to, most=most, without=without)

@@ -16,7 +16,8 @@ import numpy as np
 from .catalogue import Motion, index
 from .chains import LOST, Linearised
 from .normal import solve
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 PERIODS = 5  # that a disturbance must go through to be told from the motion
 BLOCKS = 10  # values of the force in a piece

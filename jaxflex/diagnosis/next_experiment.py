@@ -12,8 +12,8 @@ import numpy as np
 from .adopt import amplitudes_of
 from .catalogue import Candidate, Motion
 from .hypothesis import HORIZONS, Hypothesis, Search, freedom
+from .runs import Run
 from .screen import with_candidates
-from .shooting import Run
 
 ENOUGH = 10.0
 

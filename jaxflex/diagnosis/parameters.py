@@ -99,6 +99,11 @@ class Parameters:
                 return len(self.nominal) + i
         raise KeyError(f"no parameter {field!r} of {effect!r} at {location!r}.")
 
+    def bends_bristles(self, column: int) -> bool:
+        """True of a parameter by which the bristles of dry friction bend otherwise, and not only push harder."""
+        first = len(self.nominal)
+        return column >= first and self.effect[column - first].field in ("presliding", "transition_rate")
+
     def has_dry_friction(self, vector: np.ndarray) -> bool:
         """True if some joint has friction that changes sign with the rate."""
         return self._always_dry or any(

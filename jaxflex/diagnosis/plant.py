@@ -11,7 +11,7 @@ linear algebra.
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -20,8 +20,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arm.arm import AssembledArm
-from ..drive import drive, drive_effects, effect_torques, has_current_state, joint_effects
-from ..dynamics.lagrange import accelerations
+from ..drive import DriveState, drive, drive_effects, effect_torques, has_current_state, joint_effects
+from ..dynamics.lagrange import accelerations, inertial_forces
 from ..dynamics.simplify import simplified
 from ..effects import AbstractDryFriction, WindingHeating
 from ..kept import kept
@@ -69,6 +69,11 @@ def state_size(model: AssembledArm, channels: tuple[str, ...]) -> int:
     return 2 * model.size + currents + 2 * len(model.joints) + len(channels)
 
 
+def push_size(model: AssembledArm) -> int:
+    """Number of coordinates, and of currents that are states: what a push acts on."""
+    return state_size(model, ()) - 2 * len(model.joints) - model.size
+
+
 def bristles(model: AssembledArm) -> slice:
     """Where in the state of a piece the bristles of dry friction are."""
     first = state_size(model, ()) - len(model.joints)
@@ -89,8 +94,8 @@ def _drives(model: AssembledArm, command: tuple, qd: tuple, currents: tuple, hea
     return drive(model, command, currents, rates, memory)
 
 
-def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
-    """Drives and accelerations at an instant, dry friction left to `force`."""
+def _forces(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
+    """Drives, and what acts on every coordinate, at an instant; dry friction left to `force`."""
     q, qd, currents, heat, _, _ = _split(model, x)
     drives = _drives(model, command, qd, currents, heat)
     angles, _ = model.split(q)
@@ -100,30 +105,61 @@ def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tup
     torques = tuple(a + b for a, b in zip(drives.torque, extra, strict=True))
     zero = jnp.zeros_like(q[0])
     torques = torques + (zero,) * (model.size - len(torques))
-    total = tuple(tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(q), qd, strict=True))
-    return drives, accelerations(model, q, qd, total)
+    return drives, tuple(
+        tau + f - d * v for tau, f, d, v in zip(torques, force, model.damping(q), qd, strict=True)
+    )
 
 
-@simplified
-def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple) -> tuple:
-    """`x'`, bristles and instruments left where they are; tuples of scalars, which a batch turns into vectors."""
-    _, qd, _, heat, bends, shown = _split(model, x)
-    drives, qdd = _motion(model, t, x, command, force)
-    warming = [jnp.zeros_like(t)] * len(model.joints)
+def _motion(model: AssembledArm, t: Scalar, x: tuple, command: tuple, force: tuple):
+    """Drives and accelerations at an instant, dry friction left to `force`."""
+    drives, total = _forces(model, t, x, command, force)
+    return drives, accelerations(model, *_split(model, x)[:2], total)
+
+
+def _friction(model: AssembledArm, x: tuple) -> tuple:
+    """Dry friction on every coordinate, as its bristles are bent."""
+    _, qd, _, _, bends, _ = _split(model, x)
+    elastic = (jnp.zeros_like(qd[0]),) * (model.size - len(bends))
+    return (*friction_at(model, model.split(qd)[0], bends), *elastic)
+
+
+def _warming(model: AssembledArm, command: tuple, drives: DriveState, heat: tuple) -> tuple:
+    """Power that heats every winding [W]."""
+    warming = [jnp.zeros_like(h) for h in heat]
     for effect in drive_effects(model):
         if isinstance(effect, WindingHeating):
             i = effect.index
             warming[i] = effect.rate(command[i], drives.current[i], model.joints[i].motor, heat[i])
-    return (*qd, *qdd, *drives.current_rate, *warming, *(jnp.zeros_like(y) for y in (*bends, *shown)))
+    return tuple(warming)
+
+
+@simplified
+def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, push: tuple) -> tuple:
+    """`x'`, bristles and instruments left where they are; tuples of scalars, which a batch turns into vectors.
+
+    `push`: what acts beside all else, a force on every coordinate and a change of every current [A/s].
+    """
+    _, qd, _, heat, bends, shown = _split(model, x)
+    drives, qdd = _motion(model, t, x, command, push[: model.size])
+    changes = (a + b for a, b in zip(drives.current_rate, push[model.size :], strict=True))
+    warming = _warming(model, command, drives, heat)
+    return (*qd, *qdd, *changes, *warming, *(jnp.zeros_like(y) for y in (*bends, *shown)))
+
+
+@simplified
+def imbalance(model: AssembledArm, t: Scalar, x: tuple, command: tuple, qdd: tuple) -> tuple:
+    """The push under which `x` has the accelerations `qdd` and no current changes, and the heating; both negative."""
+    q, qd, _, heat, _, _ = _split(model, x)
+    drives, total = _forces(model, t, x, command, _friction(model, x))
+    left = (f - i for f, i in zip(total, inertial_forces(model, q, qd, qdd), strict=True))
+    return (*left, *drives.current_rate, *_warming(model, command, drives, heat))
 
 
 def truth(model: AssembledArm, channels: tuple[str, ...], t: Scalar, x: tuple, command: tuple) -> tuple:
     """What perfect instruments would show."""
-    q, qd, currents, heat, bends, _ = _split(model, x)
+    q, qd, currents, heat, _, _ = _split(model, x)
     if any(name.startswith("tip_acceleration") for name in channels):
-        elastic = (jnp.zeros_like(t),) * (model.size - len(bends))
-        friction = friction_at(model, model.split(qd)[0], bends)
-        drives, qdd = _motion(model, t, x, command, (*friction, *elastic))
+        drives, qdd = _motion(model, t, x, command, _friction(model, x))
     else:
         drives, qdd = _drives(model, command, qd, currents, heat), None
     found = read_channels(model, q, qd, drives, qdd)
@@ -137,12 +173,12 @@ def interval(
     stepping: Stepping,
     x: tuple,
     command: tuple,
-    force: tuple,
+    push: tuple,
     t: Scalar,
 ) -> tuple[tuple, tuple, tuple]:
     """From one sample to the next by classical Runge-Kutta steps; `x` without the instruments.
 
-    `force`: on every coordinate beside all else, held.
+    `push`: what acts beside all else, held.
 
     **Returns** the state, and what perfect instruments show at both ends.
     """
@@ -152,7 +188,7 @@ def interval(
         return tuple(a + by * b for a, b in zip(x, slope, strict=True))
 
     def one_pass(y, dry):
-        total = (*(a + b for a, b in zip(force, dry, strict=False)), *force[joints:])
+        total = (*(a + b for a, b in zip(push, dry, strict=False)), *push[joints:])
 
         def stage(carry, weights):
             # classical Runge-Kutta as a scan over its stages, which compiles once for all four
@@ -185,10 +221,10 @@ def interval(
 @kept
 def _slopes_at_rest(model: AssembledArm) -> Float[Array, "states states"]:
     zero = jnp.zeros(())
-    command, force = (zero,) * len(model.joints), (zero,) * model.size
+    command, push = (zero,) * len(model.joints), (zero,) * push_size(model)
 
     def slope(x):
-        return jnp.stack(derivative(model, zero, tuple(x), command, force))
+        return jnp.stack(derivative(model, zero, tuple(x), command, push))
 
     return jax.jacfwd(slope)(jnp.zeros(state_size(model, ())))
 
@@ -230,7 +266,7 @@ def respond(
     count = len(channels)
 
     def one(start, command, time):
-        none = (jnp.zeros_like(time[0]),) * model.size
+        none = (jnp.zeros_like(time[0]),) * push_size(model)
 
         def step(carry, inputs):
             x, shown = carry
@@ -252,62 +288,25 @@ def respond(
     return jax.vmap(one)(starts, pieces.command, pieces.time)
 
 
-class Moments(NamedTuple):
-    """Samples of a run, one after the other: the state there without the instruments, and what acts."""
+def mean_motion(
+    model: AssembledArm, sample_time: float, x: tuple, end: tuple, command: tuple, t: Scalar
+) -> tuple[tuple, tuple]:
+    """The state in the mean over an interval, and its accelerations.
 
-    x: Float[Array, "moments moving"]
-    command: Float[Array, "moments joints"]
-    time: Float[Array, " moments"]
+    Of coordinates and heat that of the cubic through both ends (Hermite); of rates and accelerations
+    what the ends show; of currents that with which they have changed as they did.
+    """
+    none = (jnp.zeros_like(t),) * push_size(model)
+    slopes = derivative(model, t, x, command, none), derivative(model, t + sample_time, end, command, none)
+    mean = tuple((a + b) / 2 + sample_time / 12 * (u - v) for a, b, u, v in zip(x, end, *slopes, strict=True))
+    gone = tuple((b - a) / sample_time for a, b in zip(x, end, strict=True))
+    n = model.size
+    rates, (_, _, _, heat, _, _) = gone[:n], _split(model, mean)
+    currents, changes = mean[2 * n : n + push_size(model)], gone[2 * n : n + push_size(model)]
 
+    def change(currents):
+        return _drives(model, command, rates, currents, heat).current_rate
 
-class Direction(NamedTuple):
-    """What is moved, None for what is not: leaves of the model, states, commands, forces."""
-
-    model: Any = None
-    x: Float[Array, "directions moving"] | None = None
-    command: Float[Array, "directions joints"] | None = None
-    force: Float[Array, "directions coordinates"] | None = None
-
-
-class Interval(NamedTuple):
-    """After an interval: the state, and what perfect instruments show at both ends."""
-
-    x: Float[Array, "*more moments moving"]
-    before: Float[Array, "*more moments channels"]
-    after: Float[Array, "*more moments channels"]
-
-
-@kept
-def interval_slopes(
-    model: AssembledArm,
-    channels: tuple[str, ...],
-    sample_time: float,
-    stepping: Stepping,
-    moments: Moments,
-    directions: Direction,
-) -> tuple[Interval, Interval]:
-    """The intervals that begin at `moments`, and their derivatives along each of `directions`, leading axis first."""
-    arrays, static = eqx.partition(model, eqx.is_inexact_array)
-
-    def one(arrays, x, command, force, t):
-        x, command, force = (tuple(part) for part in (x, command, force))
-        moved = eqx.combine(arrays, static)
-        found = interval(moved, channels, sample_time, stepping, x, command, force, t)
-        return Interval(*(jnp.stack(part) for part in found))
-
-    def run(arrays, x, command, force):
-        return jax.vmap(one, (None, 0, 0, None, 0), 0)(arrays, x, command, force, moments.time)
-
-    point = (arrays, moments.x, moments.command, jnp.zeros(model.size))
-
-    def along(direction):
-        many = tuple(
-            None if part is None else jnp.broadcast_to(part, at.shape)
-            for part, at in zip(direction[1:], point[1:], strict=True)
-        )
-        model = jax.tree.map(lambda _: None, arrays) if direction.model is None else direction.model
-        found, moved = eqx.filter_jvp(run, point, (model, *many))
-        pairs = zip(found, moved, strict=True)
-        return found, Interval(*(jnp.zeros_like(a) if b is None else b for a, b in pairs))
-
-    return jax.vmap(along, out_axes=(None, 0))(directions)
+    now, slope = jax.jvp(change, (currents,), (tuple(map(jnp.ones_like, currents)),))
+    currents = tuple(i + (c - a) / b for i, c, a, b in zip(currents, changes, now, slope, strict=True))
+    return (*mean[:n], *rates, *currents, *mean[n + push_size(model) :]), gone[n : 2 * n]

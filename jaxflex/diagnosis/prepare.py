@@ -19,7 +19,8 @@ from .catalogue import template
 from .noise import noise_floors
 from .parameters import Parameters
 from .plant import bristles, state_size, substeps_for
-from .shooting import Problem, Run, Setting
+from .runs import Run
+from .shooting import Problem, Setting
 
 OUTPUTS = ("angle", "rate", "current", "tip_deflection", "strain", "tip_acceleration")
 PIECE = 0.1  # s: the shortest horizon
@@ -159,7 +160,7 @@ def make_run(recording: Recording, inputs: Sequence[str], setting: Setting, begi
     padded = np.pad(reading, ((0, total - len(times)), (0, 0)), mode="edge").reshape(pieces, length, -1)
     valid = (np.arange(total) < len(times)).reshape(pieces, length)
     starts = first_starts(setting, times, reading, command)
-    return Run(times, command, padded, valid, starts)
+    return Run(times, command, padded, valid, starts, np.arange(pieces))
 
 
 def _typical_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:

@@ -6,11 +6,13 @@ import numpy as np
 
 from .adopt import amplitudes_of, without
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Outcome, Ranked, Search, Starts
+from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search, Starts
 from .loose_joint import is_of_loose_joint
+from .outcome import Outcome
 
 MOST = 2  # rivals of an effect that are tried
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart
+VERY_NEAR = 1.1  # misfit a reading that leaves nothing a rival could be better at
 HARDLY_MORE = 0.5  # of what is left in either case: a rival that leaves this much more is no worse
 
 
@@ -21,18 +23,22 @@ def prune(search: Search, outcome: Outcome) -> None:
         if len(outcome.final.effects) == 1:
             gains[effect.key] = outcome.final.gain(outcome.nominal)
             continue
-        search.restart(outcome.final_starts)
         rest = tuple(e for e in outcome.final.effects if e is not effect)
         vector = without(search.parameters, outcome.final.fit.vector, effect)
         size = amplitudes_of(search.parameters, outcome.final.fit.vector, effect)
         gone = bool(size) and not any(size)  # another took over all that it did
-        found = search.climb(rest, vector, ceiling=np.inf if gone else CLOSE, iterations=3)
+        if rest in outcome.passed and not gone:
+            found, starts = outcome.passed[rest]
+        else:
+            search.restart(outcome.final_starts)
+            found = search.climb(rest, vector, ceiling=np.inf if gone else CLOSE, iterations=3)
+            starts = search.starts()
         needed = outcome.final.strength(found) >= STRONG or straightens(
             search.parameters, found, outcome.final, outcome.explained
         )
         if gone or (found.horizon == outcome.final.horizon and not needed):
             search.say(f"{effect.effect} at {effect.location} is no longer needed")
-            outcome.final, outcome.final_starts = found, search.starts()
+            outcome.final, outcome.final_starts = found, starts
         else:
             gains[effect.key] = outcome.final.gain(found)
     search.restart(outcome.final_starts)
@@ -55,7 +61,7 @@ def weigh(search: Search, outcome: Outcome) -> None:
         for item, share in (*found, *((item, item.gain) for item in close[:MOST])):
             vector = without(search.parameters, final.fit.vector, effect)
             base = dataclasses.replace(final, effects=rest, fit=dataclasses.replace(final.fit, vector=vector))
-            if outcome.nominal.closest > hopeless and not _promises(search, base, starts, item, hopeless):
+            if not _promises(search, outcome, base, starts, item, hopeless):
                 continue
             rival = search.confirm(base, starts, item, final.horizon, ceiling=hopeless)
             if rival.horizon != final.horizon or not search.sensible(rival):
@@ -90,11 +96,23 @@ def weigh(search: Search, outcome: Outcome) -> None:
     search.restart(outcome.final_starts)
 
 
-def _promises(search: Search, base: Hypothesis, starts: Starts, item: Ranked, limit: float) -> bool:
-    """True if a part of the pieces leaves a candidate that is added to `base` less than `limit`."""
+def _promises(
+    search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, item: Ranked, limit: float
+) -> bool:
+    """False for a candidate in place of an effect that a part of the pieces shows to be worse.
+
+    It leaves more than `limit`; or, where nothing is left over the longest horizon that it could be better at,
+    clearly more than the final hypothesis does.
+    """
+    final = outcome.final
+    at_floor = final.fit.level < VERY_NEAR
+    if outcome.nominal.closest < limit and not at_floor:
+        return True
     search.restart(starts)
     few = search.thinned()
-    return few.confirm(base, few.starts(), item, HORIZONS[0]).closest < limit
+    own = few.climb(final.effects, final.fit.vector, to=HORIZONS[0], most=1)
+    rival = few.confirm(base, few.starts(), item, HORIZONS[0])
+    return rival.closest < limit and not (at_floor and own.strength(rival) > STRONG)
 
 
 def is_all_there_is(other: Hypothesis, rival: Hypothesis) -> bool:

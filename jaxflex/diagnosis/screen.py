@@ -10,7 +10,8 @@ import numpy as np
 from .catalogue import Candidate, Motion
 from .chains import Linearised
 from .normal import Normal, solve
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 
 @dataclass(frozen=True)

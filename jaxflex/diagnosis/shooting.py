@@ -17,51 +17,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..arm.arm import AssembledArm
 from .chains import Linearised, condense
+from .cores import respond_on_cores
 from .delay import delayed
 from .normal import Normal
 from .parameters import Parameters
-from .plant import Instruments, Pieces, Response, Stepping, respond, substeps_for
-from .steps import LANES, Intervals, Point, Steps, along_pieces
+from .plant import Instruments, Pieces, Response, Stepping, substeps_for
+from .runs import Run, Shown, Slopes
+from .steps import FEW_LANES, LANES, Intervals, Point, Steps, along_pieces
 
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
 MOST_SUBSTEPS = 24  # in a sample, where a contact is stiff
+SLIDES = 0.9999  # of its farthest: how far a bristle is bent while a joint slides
 DRY_PASSES = 2  # of a substep of one joint: the second knows the friction that the first one found
 DRY_SUBSTEPS = 3  # in a sample, at least, where dry friction may change its sign
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Slopes of every piece, in units of the noise, where they were last taken."""
-
-    by_start: np.ndarray  # (pieces, samples, channels, states)
-    end_by_start: np.ndarray  # (pieces, states, states)
-    by_column: dict[int, tuple[np.ndarray, np.ndarray]]  # readings (pieces, samples, channels), ends
-
-
-@dataclass
-class Run:
-    """A recording cut into pieces, every `stride`-th of which counts, with the states that these start from."""
-
-    times: np.ndarray  # (samples,)
-    command: np.ndarray  # (samples, joints), as logged
-    reading: np.ndarray  # (pieces, samples, channels)
-    valid: np.ndarray  # (pieces, samples)
-    starts: np.ndarray  # (pieces, states)
-    stride: int = 1
-    slopes: Slopes | None = None
-    point: Point | None = None
-
-    @property
-    def pieces(self) -> int:
-        """Number of pieces."""
-        return self.reading.shape[0]
-
-    def thinned(self, stride: int) -> "Run":
-        """Every `stride`-th piece alone, enough for fits over the shortest horizon."""
-        kept = (part[::stride] for part in (self.reading, self.valid, self.starts.copy()))
-        return Run(self.times, self.command, *kept, stride=stride)
 
 
 @dataclass
@@ -166,7 +137,7 @@ class Problem:
 
         def cut(values):
             padded = np.pad(values, (0, total - len(values)), mode="edge")
-            return padded.reshape(-1, s.length)[:: run.stride]
+            return padded.reshape(-1, s.length)[run.places]
 
         time = run.times[0] + cut(np.arange(total)) * s.sample_time
         command = np.stack([cut(c) for c in columns], -1)
@@ -176,16 +147,18 @@ class Problem:
 
     def predict(self, run: Run, vector: np.ndarray) -> Response:
         """What the pieces of a run show from their starts."""
-        return self._respond(run, vector)[0]
+        return self._shown(run, vector).response
 
-    def _respond(self, run: Run, vector: np.ndarray) -> tuple[Response, Pieces, np.ndarray]:
-        """What the pieces of a run show, the pieces, and the slope of their commands with delay."""
-        pieces, slope = self.pieces(run, vector)
-        found = respond(
-            self._model(jnp.asarray(vector)), self.instruments(vector), self.setting.channels,
-            jnp.asarray(run.starts), pieces,
-        )  # fmt: skip
-        return Response(*(np.asarray(part) for part in found)), pieces, slope
+    def _shown(self, run: Run, vector: np.ndarray) -> Shown:
+        """What the pieces of a run do from their starts, taken from there if that was asked for last."""
+        here = (vector, run.starts, run.command)
+        if run.shown is None or not run.shown.is_at(*here):
+            pieces, slope = self.pieces(run, vector)
+            model, instruments = self._model(jnp.asarray(vector)), self.instruments(vector)
+            found = respond_on_cores(model, instruments, self.setting.channels, run.starts, pieces)
+            starts, command = run.starts.copy(), run.command
+            run.shown = Shown(vector.copy(), starts, command, found, pieces, slope)
+        return run.shown
 
     def linearise(
         self,
@@ -205,8 +178,8 @@ class Problem:
         known = {} if old is None else old.by_column
         missing = [column for column in dict.fromkeys(columns) if column not in known]
         states = run.starts.shape[1]
-        motion = self._respond(run, vector)
-        reading, end = self._slopes(run, vector, motion, old is None, missing, forcing)
+        shown = self._shown(run, vector)
+        reading, end = self._slopes(run, shown, old is None, missing, forcing)
         if old is None:
             by_start, end_by_start = reading[..., :states], end[..., :states]
             reading, end = reading[..., states:], end[..., states:]
@@ -214,7 +187,7 @@ class Problem:
             by_start, end_by_start = old.by_start, old.end_by_start
         found = {column: (reading[..., k], end[..., k]) for k, column in enumerate(missing)}
         run.slopes = Slopes(by_start, end_by_start, known | found)
-        residual, gap = self._misfit(run, motion[0])
+        residual, gap = self._misfit(run, shown.response)
         by_column = [run.slopes.by_column[column] for column in columns]
         forced = range(len(missing), reading.shape[-1])
         return Linearised(
@@ -229,14 +202,13 @@ class Problem:
     def _slopes(
         self,
         run: Run,
-        vector: np.ndarray,
-        motion: tuple[Response, Pieces, np.ndarray],
+        shown: Shown,
         starts: bool,
         columns: list[int],
         forcing: np.ndarray | None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Slopes of readings and ends by the starts, then by columns, then by forcing; last axis."""
-        response, pieces, delay_slope = motion
+        vector, response, pieces = shown.vector, shown.response, shown.pieces
         states = run.starts.shape[1] if starts else 0
         if forcing is None:
             forcing = np.zeros((0, *pieces.time.shape, run.command.shape[1]))
@@ -244,7 +216,7 @@ class Problem:
         if total == 0:
             return np.zeros((*run.reading.shape, 0)), np.zeros((*run.starts.shape, 0))
         inside = [column for column in columns if self._moves_model[column]]
-        steps, tables = self._intervals(run, vector, response, pieces, inside)
+        steps, tables = self._intervals(run, shown, inside)
         start = np.eye(run.starts.shape[1], total) if starts else np.zeros((run.starts.shape[1], total))
         unit = np.zeros((total, len(vector)))
         unit[states + np.arange(len(columns)), columns] = 1.0
@@ -258,7 +230,7 @@ class Problem:
             for place, column in zip(places, inside, strict=True):
                 added[..., place] = tables[column][:, k]
             for place, joint in delays:
-                added[..., place] = steps.by_input[:, k, :, joint] * delay_slope[:, k, None, joint]
+                added[..., place] = steps.by_input[:, k, :, joint] * shown.delay_slope[:, k, None, joint]
             acting = np.moveaxis(forcing[:, :, k], 0, -1)
             added[..., states + len(columns) :] = steps.by_input[:, k, :, : acting.shape[1]] @ acting
             return added
@@ -276,25 +248,44 @@ class Problem:
         reading = reading / self.setting.noise[:, None]
         return np.where(run.valid[..., None, None], reading, 0.0), end
 
-    def _intervals(
-        self, run: Run, vector: np.ndarray, response: Response, pieces: Pieces, columns: list[int]
-    ) -> tuple[Steps, dict[int, np.ndarray]]:
+    def _intervals(self, run: Run, shown: Shown, columns: list[int]) -> tuple[Steps, dict[int, np.ndarray]]:
         """The intervals of a run made linear, and their slopes by parameters of the arm."""
-        intervals = Intervals(self._model(jnp.asarray(vector)), self.setting.channels, pieces, response)
-        here = (vector, run.starts, run.command)
+        vector, here = shown.vector, (shown.vector, shown.starts, shown.command)
+        model = self._model(jnp.asarray(vector))
+        rough = self._rough(vector, shown.response)
+        intervals = Intervals(model, self.setting.channels, shown.pieces, shown.response, rough)
         if run.point is None or not run.point.is_at(*here):
-            copies = [part.copy() for part in here]
-            run.point = Point(copies[0], copies[1], copies[2], intervals.steps(), {})
-        known = run.point.by_parameter
+            run.point = Point(*here, intervals.steps(), {})
+        steps, known = run.point.steps, run.point.by_parameter
         missing = [column for column in columns if column not in known]
-        groups = [missing[k : k + LANES] for k in range(0, len(missing), LANES)]
-        unit = np.zeros((len(groups), LANES, len(vector)))
+        parameters = self.setting.parameters
+        # contacts are stiff, and open and shut within an interval
+        direct = [c for c in missing if parameters.plays or parameters.bends_bristles(c)]
+        groups, tangents = self._along(vector, direct, LANES if parameters.plays else FEW_LANES)
+        tables = intervals.by_bristles(tangents)
+        more, tangents = self._along(vector, [c for c in missing if c not in direct], LANES)
+        tables += intervals.by_balance(tangents, steps)
+        for group, table in zip(groups + more, tables, strict=True):
+            known.update((column, table[..., k]) for k, column in enumerate(group))
+        return steps, known
+
+    def _rough(self, vector: np.ndarray, response: Response) -> np.ndarray:
+        """Where a joint sticks or turns, `(pieces, samples)`; everywhere if contacts open and shut."""
+        shape, parameters = response.states.shape[:2], self.setting.parameters
+        if parameters.plays or not parameters.has_dry_friction(vector):
+            return np.full(shape, bool(parameters.plays))
+        bends = np.concatenate([response.states, response.end[:, None]], 1)[..., self._bristles]
+        return np.any(bends[:, :-1] * bends[:, 1:] < SLIDES**2, axis=-1, keepdims=False)
+
+    def _along(
+        self, vector: np.ndarray, columns: list[int], lanes: int
+    ) -> tuple[list[list[int]], list[AssembledArm]]:
+        """The columns in groups, and slopes of the model's leaves by `lanes` of them at a time."""
+        groups = [columns[k : k + lanes] for k in range(0, len(columns), lanes)]
+        unit = np.zeros((len(groups), lanes, len(vector)))
         for k, group in enumerate(groups):
             unit[k, np.arange(len(group)), group] = 1.0
-        tangents = [self._tangents(jnp.asarray(vector), jnp.asarray(rows)) for rows in unit]
-        for group, table in zip(groups, intervals.by_parameters(tangents), strict=True):
-            known.update((column, table[..., k]) for k, column in enumerate(group))
-        return run.point.steps, known
+        return groups, [self._tangents(jnp.asarray(vector), jnp.asarray(rows)) for rows in unit]
 
     def _misfit(self, run: Run, response: Response) -> tuple[np.ndarray, np.ndarray]:
         """Residual of every reading in units of the noise, and the gap after every piece."""
@@ -339,9 +330,11 @@ class Problem:
 
         No reading sees them, and left free they would make up for friction that is missing.
         """
-        if run.stride == 1 and self.setting.parameters.has_dry_friction(vector):
+        if self.setting.parameters.has_dry_friction(vector):
             ends = self.predict(run, vector).end[:-1, self._bristles]
-            run.starts[1:, self._bristles] = np.where(np.isfinite(ends), np.clip(ends, -1, 1), 0.0)
+            bent = np.where(np.isfinite(ends), np.clip(ends, -1, 1), 0.0)
+            own = run.starts[1:, self._bristles]
+            run.starts[1:, self._bristles] = np.where(run.follows[1:, None], bent, own)
 
     def join(self, run: Run, vector: np.ndarray) -> None:
         """Move every start to where the piece before ends, unless that fits clearly worse.
@@ -356,7 +349,8 @@ class Problem:
     def _from_before(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the pieces before end, and misfits of every piece from its own start and from there."""
         response = self.predict(run, vector)
-        other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], response.end[:-1]]))
+        ends = np.where(run.follows[1:, None], response.end[:-1], run.starts[1:])
+        other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], ends]))
         there = self.misfit(other, self.predict(other, vector))
         return other.starts, self.misfit(run, response), there
 

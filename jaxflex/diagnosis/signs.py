@@ -12,7 +12,8 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .hypothesis import SOME, settle
 from .prepare import first_starts, make_problem, wanted_channels
-from .shooting import Problem, Run
+from .runs import Run
+from .shooting import Problem
 
 ASTRAY = 50.0  # misfit a reading over the shortest horizon, in units of the noise: signs are tried beyond it
 BETTER = 0.25  # of the misfit: what is left at most where a sign was wrong
@@ -53,7 +54,7 @@ def _mirrored(problem: Problem, run: Run, signs: np.ndarray) -> Run:
     command, reading = of_commands * run.command, of_readings * run.reading
     rows = reading.reshape(-1, reading.shape[-1])[: len(run.times)]
     starts = first_starts(problem.setting, run.times, rows, command)
-    return Run(run.times, command, reading, run.valid, starts)
+    return Run(run.times, command, reading, run.valid, starts, run.places)
 
 
 def _turned(recording: Recording, names: frozenset[str]) -> Recording:

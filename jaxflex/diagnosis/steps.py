@@ -1,9 +1,11 @@
 """Slopes of a run's pieces from those of its sample intervals.
 
 An interval knows nothing of the one before it but the state it begins with. So all
-intervals of a run are made linear side by side, by their states, by what acts during them
-and by the parameters of the arm; a slope along a piece is then products of small
-matrices, and a force or a command, whatever its course, costs no more than that.
+intervals of a run are made linear side by side, by their states and by what acts during
+them; a slope along a piece is then products of small matrices, and a force or a command,
+whatever its course, costs no more than that. A parameter of the arm is as good as the
+forces and voltages that make up for it while the motion stays: those halfway through an
+interval, held over it, are its slope to second order in the sample time.
 """
 
 # arrays of numpy go to JAX and come back, which its annotations do not foresee
@@ -11,7 +13,7 @@ matrices, and a force or a command, whatever its course, costs no more than that
 
 import itertools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -20,10 +22,13 @@ import jax
 import numpy as np
 
 from ..arm.arm import AssembledArm
-from .plant import Direction, Instruments, Interval, Moments, Pieces, Response, interval_slopes, lag
+from .plant import Instruments, Pieces, Response, lag, push_size
+from .slopes import Direction, Imbalance, Interval, Moments, imbalance_slopes, interval_slopes, true_readings
 
 MOMENTS = 850  # intervals that are made linear at once; fewer take longer, and powers of two do
+EVERY = 7  # of so many intervals one is made linear where nothing sticks, turns or strikes
 LANES = 8  # parameters whose slopes are taken side by side: one compiled program whatever their number
+FEW_LANES = 2  # the same where only a bristle is bent otherwise
 
 
 @dataclass(frozen=True)
@@ -37,71 +42,142 @@ class Steps:
     before: np.ndarray  # what perfect instruments show, (pieces, samples, channels)
     after: np.ndarray
     by_state: np.ndarray
-    by_input: np.ndarray  # columns: commands, then forces on the coordinates
+    by_input: np.ndarray  # columns: commands, then pushes: forces on the coordinates, and on currents
 
 
 @dataclass(frozen=True)
-class Point:
-    """What the intervals of a run were made linear about, and all slopes found there so far."""
+class Here:
+    """Where a run is: its parameters, the starts of its pieces, its commands."""
 
     vector: np.ndarray
     starts: np.ndarray
     command: np.ndarray
-    steps: Steps
-    by_parameter: dict[int, np.ndarray]  # outcomes of the intervals, (pieces, samples, outcomes)
 
     def is_at(self, *here: np.ndarray) -> bool:
         """True if vector, starts and command are still these."""
         return all(map(np.array_equal, here, (self.vector, self.starts, self.command)))
 
 
-class Intervals:
-    """The intervals of the pieces that gave a `response`, to be made linear there."""
+@dataclass(frozen=True)
+class Point(Here):
+    """What the intervals of a run were made linear about, and all slopes found there so far."""
 
-    def __init__(self, model: AssembledArm, channels: tuple[str, ...], pieces: Pieces, response: Response):
+    steps: Steps
+    by_parameter: dict[int, np.ndarray]  # outcomes of the intervals, (pieces, samples, outcomes)
+
+
+class Intervals:
+    """The intervals of the pieces that gave a `response`, to be made linear there.
+
+    `rough` (pieces, samples): where something sticks, turns or strikes.
+    """
+
+    def __init__(
+        self,
+        model: AssembledArm,
+        channels: tuple[str, ...],
+        pieces: Pieces,
+        response: Response,
+        rough: np.ndarray,
+    ):
         self.model = model
         self.channels = channels
         self.pieces = pieces
-        self.shape = pieces.time.shape
-        count = int(np.prod(self.shape))
-        self.chunks = np.minimum(np.arange(-(-count // MOMENTS) * MOMENTS), count - 1).reshape(-1, MOMENTS)
-        moving = response.states[..., : -len(channels)]
-        parts = (moving, np.asarray(pieces.command), np.asarray(pieces.time))
-        self.moments = Moments(*(part.reshape(count, *part.shape[2:]) for part in parts))
+        self.shape = rough.shape
+        self.rough = np.flatnonzero(rough)
+        moving, ends = response.states[..., : -len(channels)], response.end[:, None, : -len(channels)]
+        following = np.concatenate([moving[:, 1:], ends], 1)
+        parts = (moving, following, np.asarray(pieces.command), np.asarray(pieces.time))
+        self.moments = Moments(*(part.reshape(rough.size, *part.shape[2:]) for part in parts))
+        self.everywhere = np.arange(rough.size)
 
     def steps(self) -> Steps:
-        """The intervals with their slopes by state and by what acts."""
-        moving, joints = self.moments.x.shape[1], self.moments.command.shape[1]
-        sizes = (moving, joints, self.model.size)
-        x, command, force = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
-        [(found, table)] = self._tables([Direction(None, x, command, force)])
-        return Steps(found.before, found.after, table[..., :moving], table[..., moving:])
+        """The intervals with their slopes by state and by what acts.
 
-    def by_parameters(self, tangents: list[Any]) -> list[np.ndarray]:
-        """Slopes of the outcomes along groups of directions of the model's leaves."""
-        return [table for _, table in self._tables([Direction(moved) for moved in tangents])]
+        Where the motion is not rough one in EVERY says what the others are, along straight lines.
+        """
+        moving, joints = self.moments.x.shape[-1], self.moments.command.shape[-1]
+        sizes = (moving, joints, push_size(self.model))
+        x, command, push = np.split(np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+        samples = self.shape[1]
+        place = self.everywhere % samples
+        some = np.flatnonzero((place % EVERY == 0) | (place == samples - 1))
+        beside = np.clip(np.concatenate([self.rough - 1, self.rough, self.rough + 1]), 0, len(place) - 1)
+        taken = np.union1d(some, beside)
+        [table] = self._moved(taken, [Direction(None, x, command, push)])
+        table = self._whole(_between(table, taken, self.everywhere))
+        [[before, after]] = self._tables(self._readings, self.everywhere, [None])
+        before, after = self._whole(before[..., 0]), self._whole(after[..., 0])
+        return Steps(before, after, table[..., :moving], table[..., moving:])
 
-    def _tables(self, directions: list[Direction]) -> list[tuple[Interval, np.ndarray]]:
-        def some(task):
+    def by_bristles(self, tangents: list[Any]) -> list[np.ndarray]:
+        """Slopes of the outcomes along groups of directions of the model's leaves, none where it is not rough."""
+        found = []
+        for some in self._moved(self.rough, [Direction(moved) for moved in tangents]):
+            table = np.zeros((len(self.everywhere), *some.shape[1:]))
+            table[self.rough] = some
+            found.append(self._whole(table))
+        return found
+
+    def by_balance(self, tangents: list[Any], steps: Steps) -> list[np.ndarray]:
+        """The same by what makes up for each, unless it changes how bristles bend."""
+        tables = []
+        for parts in self._tables(self._imbalance, self.everywhere, tangents):
+            push, heating, before, after = map(self._whole, parts)
+            table = steps.by_input[..., -push.shape[2] :] @ push
+            moving, joints, channels = steps.by_state.shape[-1], heating.shape[2], before.shape[2]
+            table[:, :, moving - 2 * joints : moving - joints] += self.pieces.sample_time * heating
+            table[:, :, moving : moving + channels] += before
+            table[:, :, moving + channels :] += after
+            tables.append(table)
+        return tables
+
+    def _whole(self, table: np.ndarray) -> np.ndarray:
+        return table.reshape(*self.shape, *table.shape[1:])
+
+    def _moved(self, places: np.ndarray, directions: list[Direction]) -> list[np.ndarray]:
+        return [np.concatenate(parts, 1) for parts in self._tables(self._slopes, places, directions)]
+
+    def _slopes(self, moments: Moments, direction: Direction) -> Interval:
+        dt, stepping = self.pieces.sample_time, self.pieces.stepping
+        return interval_slopes(self.model, self.channels, dt, stepping, moments, direction)
+
+    def _imbalance(self, moments: Moments, direction: Any) -> Imbalance:
+        return imbalance_slopes(self.model, self.channels, self.pieces.sample_time, moments, direction)
+
+    def _readings(self, moments: Moments, _: None) -> tuple:
+        return true_readings(self.model, self.channels, self.pieces.sample_time, moments)
+
+    def _tables(
+        self, kernel: Callable[[Moments, Any], Iterable], places: np.ndarray, directions: list[Any]
+    ) -> list[list[np.ndarray]]:
+        """What `kernel` gives at some moments along each of `directions`: tables `(moments, outcomes, lanes)`.
+
+        It works on MOMENTS of them at a time, `(lanes, moments, outcomes)`.
+        """
+        count = max(len(places), 1)
+        chunks = np.resize(places if len(places) else [0], (-(-count // MOMENTS), MOMENTS))
+
+        def one(task):
             direction, chunk = task
-            part = Moments(*(a[chunk] for a in self.moments))
-            found = interval_slopes(
-                self.model, self.channels, self.pieces.sample_time, self.pieces.stepping, part, direction
-            )
-            return [np.asarray(a) for interval in found for a in interval]
+            some = Moments(*(part[chunk] for part in self.moments))
+            return [np.asarray(part) for part in kernel(some, direction)]
+
+        def table(parts):
+            whole = np.concatenate(parts, 1)[:, : len(places)]
+            return np.ascontiguousarray(np.moveaxis(whole, 0, -1))
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            done = list(pool.map(some, itertools.product(directions, self.chunks)))
-        chunks = len(self.chunks)
-        return [self._joined(done[k * chunks : (k + 1) * chunks]) for k in range(len(directions))]
+            done = list(pool.map(one, itertools.product(directions, chunks)))
+        whole = [done[k : k + len(chunks)] for k in range(0, len(done), len(chunks))]
+        return [[table(parts) for parts in zip(*some, strict=True)] for some in whole]
 
-    def _joined(self, chunks: list[list[np.ndarray]]) -> tuple[Interval, np.ndarray]:
-        count = int(np.prod(self.shape))
-        parts = list(zip(*chunks, strict=True))
-        point = [np.concatenate(part)[:count].reshape(*self.shape, -1) for part in parts[:3]]
-        outcomes = [np.concatenate(part, 1)[:, :count] for part in parts[3:]]
-        table = np.ascontiguousarray(np.moveaxis(np.concatenate(outcomes, -1), 0, -1))
-        return Interval(*point), table.reshape(*self.shape, *table.shape[1:])
+
+def _between(table: np.ndarray, taken: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Rows of a table at the moments `wanted`, from those `taken`, along straight lines."""
+    left = np.clip(np.searchsorted(taken, wanted, side="right") - 1, 0, len(taken) - 2)
+    share = ((wanted - taken[left]) / (taken[left + 1] - taken[left]))[:, None, None]
+    return (1 - share) * table[left] + share * table[left + 1]
 
 
 def along_pieces(

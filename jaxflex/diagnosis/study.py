@@ -8,7 +8,8 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .calibrate import fit
 from .foretell import Foretold, foretell
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Outcome, Search, freedom, restart
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom, restart
+from .outcome import Outcome
 from .prepare import HeldOut, make_problem
 
 Say = Callable[[str], None]

@@ -123,7 +123,7 @@ def _with_slope(primals, tangents):
     model, q, qd, force = primals
     qdd = _accelerations(model, q, qd, force)
     still = (None,) * len(qdd)
-    _, moved = eqx.filter_jvp(cleaned(_inertial), (model, q, qd, qdd), (*tangents[:3], still))
+    _, moved = eqx.filter_jvp(cleaned(inertial_forces), (model, q, qd, qdd), (*tangents[:3], still))
     right = tuple(
         (jnp.zeros_like(a) if f is None else f) - (0.0 if m is None else m)
         for a, f, m in zip(qdd, tangents[3], moved, strict=True)
@@ -131,8 +131,8 @@ def _with_slope(primals, tangents):
     return qdd, solve(_along_each(lambda qd: _momentum(model, q, qd), qd), right)
 
 
-def _inertial(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tuple[Scalar, ...]:
-    """`d/dt(dL/dq') - dL/dq` under the accelerations `qdd`."""
+def inertial_forces(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tuple[Scalar, ...]:
+    """`M q'' + C q' + g = d/dt(dL/dq') - dL/dq` under the accelerations `qdd`."""
     change = jax.jvp(lambda q, qd: _momentum(model, q, qd), (q, qd), (qd, qdd))[1]
     return tuple(c - s for c, s in zip(change, _generalised_force(model, q, qd), strict=True))
 
@@ -144,4 +144,4 @@ def inverse_dynamics(model: AssembledArm, q: tuple, qd: tuple, qdd: tuple) -> tu
     other forces has none. From the Lagrangian: `d/dt(dL/dq') - dL/dq + D q'`.
     """
     damped = map(lambda d, v: d * v, model.damping(), qd)
-    return tuple(f + d for f, d in zip(_inertial(model, q, qd, qdd), damped, strict=True))
+    return tuple(f + d for f, d in zip(inertial_forces(model, q, qd, qdd), damped, strict=True))

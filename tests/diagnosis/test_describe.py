@@ -8,7 +8,8 @@ from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.describe import bends_before_it_slides, lacking
 from jaxflex.diagnosis.estimates import OWN_ERROR, own_error
 from jaxflex.diagnosis.find import find
-from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
+from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.effects import EFFECTS
 
 RIPPLE = Candidate("cogging_torque", "joint_1", ("sine", "cosine"), (("order", 6.0),))

@@ -17,7 +17,8 @@ from jaxflex.diagnosis import diagnose
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.diagnose import _has_not_seen
 from jaxflex.diagnosis.gauge import by_gauge
-from jaxflex.diagnosis.hypothesis import Outcome, Search
+from jaxflex.diagnosis.hypothesis import Search
+from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.parameters import _nominal
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study

@@ -4,7 +4,7 @@ import numpy as np
 
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.estimates import drop_unseen, is_seen
-from jaxflex.diagnosis.hypothesis import Outcome
+from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.prepare import HeldOut
 from jaxflex.diagnosis.result import Estimate
 from jaxflex.diagnosis.study import Study

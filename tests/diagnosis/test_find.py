@@ -64,4 +64,4 @@ def test_a_small_change_of_a_part_is_the_likeliest(swung, horizon):
     base, starts = settled_at(search, (), search.parameters.start)
     likeliest = sift(search, base, starts, search.parts(()), horizon)
     assert likeliest[0].candidate.effect == "viscous_friction"
-    assert all(run.stride == 1 for run in search.runs)
+    assert all(run.pieces == len(run.reading) and run.follows[1:].all() for run in search.runs)

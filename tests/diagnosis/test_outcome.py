@@ -6,8 +6,9 @@ from jaxflex.diagnosis.calibrate import Fit, Freedom
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.describe import _verdict
 from jaxflex.diagnosis.find import MOST_EFFECTS
-from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Outcome
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
 from jaxflex.diagnosis.normal import Normal
+from jaxflex.diagnosis.outcome import Outcome
 
 COUNT = 1000
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.hypothesis import CLOSE, FAIR, Outcome, Search
+from jaxflex.diagnosis.hypothesis import CLOSE, FAIR, Search
+from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.rivals import is_all_there_is, prune
 
 DRAG = Candidate("quadratic_drag", "joint_1", ("coefficient",))

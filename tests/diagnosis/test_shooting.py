@@ -81,32 +81,112 @@ def test_pieces_joined_are_the_simulation(prepared):
         np.testing.assert_allclose(ours, expected, atol=3e-4 * np.abs(expected).max())
 
 
-def test_slopes_are_finite_differences(prepared):
-    problem = prepared[0].problem
-    run = prepared[0].calibration[0]
-    vector = problem.setting.parameters.start
+def slopes(problem, run, vector, column, h=1e-6):
+    """Slopes of readings and ends by differences."""
+    up, down = vector.copy(), vector.copy()
+    up[column], down[column] = up[column] + h, down[column] - h
+    a, b = problem.predict(run, up), problem.predict(run, down)
+    return (a.reading - b.reading) / (2 * h) / problem.setting.noise, (a.end - b.end) / (2 * h)
+
+
+def everywhere(vector, response):
+    """Every interval made linear by itself."""
+    return np.ones(response.states.shape[:2], bool)
+
+
+def test_slopes_by_starts_lags_and_bristles_are_finite_differences(prepared, monkeypatch):
+    problem, run = prepared[0].problem, prepared[0].calibration[0]
+    monkeypatch.setattr(problem, "_rough", everywhere)
     names = problem.setting.parameters.names
+    vector = problem.setting.parameters.start.copy()
+    vector[names.index("coulomb_friction at joint_1: torque")] = 2e-3
+    vector[names.index("sensor_lag at tip_deflection_1: lag")] = 3e-3
     columns = [
-        names.index("length"),
-        names.index("torque_constant"),
-        names.index("coulomb_friction at joint_1: torque"),
-        names.index("payload_mass at tip: mass"),
         names.index("sensor_lag at tip_deflection_1: lag"),
-        names.index("root_compliance at link_1: compliance"),
+        names.index("coulomb_friction at joint_1: presliding"),
     ]
-    # these act one way only, so differences are taken where they are there
-    vector = vector.copy()
-    vector[columns[2]], vector[columns[4]], vector[columns[5]] = 2e-3, 3e-3, 1e-2
     linear = problem.linearise(run, vector, columns)
+    run.slopes = run.point = None
     for k, column in enumerate(columns):
-        h = 1e-6
-        up, down = vector.copy(), vector.copy()
-        up[column], down[column] = up[column] + h, down[column] - h
-        a, b = problem.predict(run, up), problem.predict(run, down)
-        slope = (a.reading - b.reading) / (2 * h) / problem.setting.noise
-        scale = np.abs(slope).max()
-        np.testing.assert_allclose(linear.by_column[..., k], slope, atol=2e-5 * scale)
-        np.testing.assert_allclose(linear.end_by_column[..., k], (a.end - b.end) / (2 * h), atol=1e-4)
+        reading, end = slopes(problem, run, vector, column)
+        np.testing.assert_allclose(linear.by_column[..., k], reading, atol=1e-4 * np.abs(reading).max())
+        np.testing.assert_allclose(linear.end_by_column[..., k], end, atol=1e-4 * np.abs(end).max())
+    starts, h = run.starts, 1e-6
+    for state in range(starts.shape[1]):
+        shifted = []
+        for sign in (1, -1):
+            moved = starts.copy()
+            moved[:, state] += sign * h
+            shifted.append(problem.predict(dataclasses.replace(run, starts=moved), vector))
+        reading = (shifted[0].reading - shifted[1].reading) / (2 * h) / problem.setting.noise
+        scale = np.abs(reading).max()
+        np.testing.assert_allclose(linear.by_start[..., state], reading, atol=1e-4 * scale + 1e-9)
+
+
+@pytest.mark.parametrize("torque", [0.0, 2e-3])
+def test_intervals_left_out_are_between_those_made_linear(prepared, monkeypatch, torque):
+    """Where nothing sticks or turns, slopes change slowly; where something does, every interval counts."""
+    problem, run = prepared[0].problem, prepared[0].calibration[0]
+    names = problem.setting.parameters.names
+    vector = problem.setting.parameters.start.copy()
+    friction = [names.index(f"coulomb_friction at joint_1: {field}") for field in ("torque", "presliding")]
+    vector[friction[0]] = torque
+    columns = [names.index(name) for name, _ in MOVED] + (friction if torque else [])
+    some = problem.linearise(run, vector, columns)
+    run.slopes = run.point = None
+    monkeypatch.setattr(problem, "_rough", everywhere)
+    every = problem.linearise(run, vector, columns)
+    run.slopes = run.point = None
+    for a, b in ((some.by_start, every.by_start), (some.by_column, every.by_column)):
+        scale = np.sqrt(np.mean(b**2, (0, 1, 2)))
+        assert (np.sqrt(np.mean((a - b) ** 2, (0, 1, 2))) < 0.01 * scale + 1e-12).all()
+    assert not np.array_equal(some.by_column, every.by_column)
+
+
+MOVED = (  # parameters of the arm, with values at which they act both ways
+    ("length", 0.0),
+    ("torque_constant", 0.0),
+    ("hub_inertia", 0.0),
+    ("resistance", 0.0),
+    ("inductance", 0.0),
+    ("payload_mass at tip: mass", 0.0),
+    ("gravity at base: along_y", 0.0),
+    ("viscous_friction at joint_1: coefficient", 1e-3),
+    ("root_compliance at link_1: compliance", 1e-2),
+    ("winding_heating at joint_1: coefficient", 1e-2),
+)
+
+
+def slope_errors(step, cooling=0.5):
+    """Error of the slopes by parameters of the arm, as a share of them, where samples are `step` apart."""
+    t = np.arange(round(0.4 / step)) * step
+    rng = np.random.default_rng(3)
+    channels = {"voltage_1": 1.5 * np.sin(7 * t) + 0.8 * np.sin(23 * t)}
+    for name, size in (("angle_1", 0.3), ("current_1", 0.5), ("tip_deflection_1", 2e-3)):
+        channels[name] = size * np.sin(7 * t) + 1e-4 * size * rng.standard_normal(len(t))
+    file = ArmFile(nominal(), {"default": 0.03}, None)
+    problem = make_problem(file, [jf.Recording(t, channels, ())]).problem
+    problem.setting.substeps = 6
+    run = make_problem(file, [jf.Recording(t, channels, ())]).calibration[0]
+    names = problem.setting.parameters.names
+    vector = problem.setting.parameters.start.copy()
+    vector[names.index("winding_heating at joint_1: cooling_time")] = cooling
+    for name, value in MOVED:
+        vector[names.index(name)] = value
+    columns = [names.index(name) for name, _ in MOVED]
+    linear = problem.linearise(run, vector, columns)
+    errors = {}
+    for k, (name, _) in enumerate(MOVED):
+        reading, _ = slopes(problem, run, vector, columns[k])
+        errors[name] = np.sqrt(np.mean((linear.by_column[..., k] - reading) ** 2) / np.mean(reading**2))
+    return errors
+
+
+def test_slopes_by_parameters_are_of_second_order_in_the_sample_time():
+    coarse, fine = slope_errors(4e-3), slope_errors(1e-3)
+    for name, error in coarse.items():
+        assert error < 0.2, name
+        assert fine[name] < max(error / 10, 2e-4), (name, error, fine[name])
 
 
 def test_a_fit_over_any_horizon_finds_the_parameters(prepared):
