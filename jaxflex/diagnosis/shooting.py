@@ -252,16 +252,14 @@ class Problem:
         """The intervals of a run made linear, and their slopes by parameters of the arm."""
         vector, here = shown.vector, (shown.vector, shown.starts, shown.command)
         model = self._model(jnp.asarray(vector))
-        rough = self._rough(vector, shown.response)
+        rough = self.rough(vector, shown.response)
         intervals = Intervals(model, self.setting.channels, shown.pieces, shown.response, rough)
         if run.point is None or not run.point.is_at(*here):
             run.point = Point(*here, intervals.steps(), {})
         steps, known = run.point.steps, run.point.by_parameter
         missing = [column for column in columns if column not in known]
-        parameters = self.setting.parameters
-        # contacts are stiff, and open and shut within an interval
-        direct = [c for c in missing if parameters.plays or parameters.bends_bristles(c)]
-        groups, tangents = self._along(vector, direct, LANES if parameters.plays else FEW_LANES)
+        direct = [column for column in missing if self.is_direct(column)]
+        groups, tangents = self._along(vector, direct, LANES if len(direct) > FEW_LANES else FEW_LANES)
         tables = intervals.by_bristles(tangents)
         more, tangents = self._along(vector, [c for c in missing if c not in direct], LANES)
         tables += intervals.by_balance(tangents, steps)
@@ -269,7 +267,12 @@ class Problem:
             known.update((column, table[..., k]) for k, column in enumerate(group))
         return steps, known
 
-    def _rough(self, vector: np.ndarray, response: Response) -> np.ndarray:
+    def is_direct(self, column: int) -> bool:
+        """True of a parameter that no force makes up for: of bristles, and of all where contacts open and shut."""
+        parameters = self.setting.parameters
+        return bool(parameters.plays) or parameters.bends_bristles(column)
+
+    def rough(self, vector: np.ndarray, response: Response) -> np.ndarray:
         """Where a joint sticks or turns, `(pieces, samples)`; everywhere if contacts open and shut."""
         shape, parameters = response.states.shape[:2], self.setting.parameters
         if parameters.plays or not parameters.has_dry_friction(vector):

@@ -28,7 +28,7 @@ from .slopes import Direction, Imbalance, Interval, Moments, imbalance_slopes, i
 MOMENTS = 850  # intervals that are made linear at once; fewer take longer, and powers of two do
 EVERY = 7  # of so many intervals one is made linear where nothing sticks, turns or strikes
 LANES = 8  # parameters whose slopes are taken side by side: one compiled program whatever their number
-FEW_LANES = 2  # the same where only a bristle is bent otherwise
+FEW_LANES = 2  # the same of no more parameters than that
 
 
 @dataclass(frozen=True)

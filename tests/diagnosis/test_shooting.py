@@ -96,7 +96,7 @@ def everywhere(vector, response):
 
 def test_slopes_by_starts_lags_and_bristles_are_finite_differences(prepared, monkeypatch):
     problem, run = prepared[0].problem, prepared[0].calibration[0]
-    monkeypatch.setattr(problem, "_rough", everywhere)
+    monkeypatch.setattr(problem, "rough", everywhere)
     names = problem.setting.parameters.names
     vector = problem.setting.parameters.start.copy()
     vector[names.index("coulomb_friction at joint_1: torque")] = 2e-3
@@ -134,7 +134,7 @@ def test_intervals_left_out_are_between_those_made_linear(prepared, monkeypatch,
     columns = [names.index(name) for name, _ in MOVED] + (friction if torque else [])
     some = problem.linearise(run, vector, columns)
     run.slopes = run.point = None
-    monkeypatch.setattr(problem, "_rough", everywhere)
+    monkeypatch.setattr(problem, "rough", everywhere)
     every = problem.linearise(run, vector, columns)
     run.slopes = run.point = None
     for a, b in ((some.by_start, every.by_start), (some.by_column, every.by_column)):
