@@ -148,7 +148,7 @@ def derivative(model: AssembledArm, t: Scalar, x: tuple, command: tuple, push: t
 
 @simplified
 def imbalance(model: AssembledArm, t: Scalar, x: tuple, command: tuple, qdd: tuple) -> tuple:
-    """The push under which `x` has the accelerations `qdd` and no current changes, and the heating; both negative."""
+    """What is left of the forces under the accelerations `qdd`, how currents change, and the power that heats."""
     q, qd, _, heat, _, _ = _split(model, x)
     drives, total = _forces(model, t, x, command, _friction(model, x))
     left = (f - i for f, i in zip(total, inertial_forces(model, q, qd, qdd), strict=True))
