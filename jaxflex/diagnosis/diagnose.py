@@ -119,12 +119,20 @@ def _leaves_much(study: Study) -> bool:
     """True if what was found leaves a gap, or had to bend the arm's parameters to close it."""
     outcome = study.outcome
     much = outcome.level > FAIR and outcome.level - 1 > LITTLE * (outcome.nominal_level - 1)
-    return much or is_bent(study.search.parameters, outcome.final, outcome.explained)
+    return much or is_bent(study.search.parameters, outcome.final, outcome.explained) or _is_strained(study)
+
+
+def _is_strained(study: Study) -> bool:
+    """True if a joint is soft, and the arm's parameters make up for what turns on the motor's side of it."""
+    soft = any(effect.effect == "joint_flexibility" for effect in study.outcome.final.effects)
+    return soft and is_bent(study.search.parameters, study.everything(), study.outcome.explained)
 
 
 def _solves(loose: Study, other: Study) -> bool:
-    """True if a joint that comes apart explains nearly all that is left without it."""
+    """True if a joint that comes apart explains nearly all that is left without it, or strains no parameters."""
     left = loose.foretold().level
+    if _is_strained(other) and not _is_strained(loose) and left < max(AT_FLOOR, other.foretold().level):
+        return True
     # of a bare axis the load is never seen, and its starts fit much that is something else
     seen = bool(loose.file.arm.links) or left < AT_FLOOR
     gone = left - 1 < SOLVED * (other.foretold().level - 1)

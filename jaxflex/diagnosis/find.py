@@ -1,5 +1,6 @@
 """The search: effects are added one at a time until nothing in the catalogue stands out."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -19,6 +20,7 @@ from .hypothesis import (
     Ranked,
     Search,
     Starts,
+    allowance,
     form_error,
     freedom,
 )
@@ -30,7 +32,9 @@ FURTHER = HORIZONS[1]  # over which parts of the arm are told apart, where the m
 SHORT_LIST = 3
 PAIR = 2  # of the short list that are tried two at a time
 NEAR = 0.5  # of the strongest: rivals below it are not fitted
+CLEAR = 10.0  # times the allowance: a gain over a tenth of a second that tells parts apart
 WORSE = 1e-3  # misfit a reading by which a fit with one more effect is no fit
+ASIDE = 0.03  # the same, of what is left beyond the noise
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 HALF = 0.3  # of a larger one that an effect has to explain
 LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
@@ -264,8 +268,7 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked], 
     elif nothing.horizon == horizon and nothing.fit.level < CLOSE:
         items = _promising(search, nothing, items)
     best: dict[tuple[str, str], tuple[float, Ranked]] = {}
-    for item in items:
-        found = search.confirm(base, starts, item, horizon, without=nothing)
+    for item, found in _followed(search, base, starts, items, nothing, horizon):
         cost = found.costs.get(horizon, np.inf)
         if item.candidate.key not in best or cost < best[item.candidate.key][0]:
             best[item.candidate.key] = cost, item
@@ -274,12 +277,39 @@ def sift(search: Search, base: Hypothesis, starts: Starts, items: list[Ranked], 
     return [item for cost, item in ranked if left - cost >= NEAR * (left - ranked[0][0])]
 
 
+def _followed(
+    search: Search, base: Hypothesis, starts: Starts, items: list[Ranked], nothing: Hypothesis, horizon: int
+) -> list[tuple[Ranked, Hypothesis]]:
+    """Each of the items fitted over `horizon`, but for those far behind one that is clearly ahead over the shortest."""
+    begun = [(item, search.confirm(base, starts, item, HORIZONS[0]), search.starts()) for item in items]
+    short = HORIZONS[0]
+    most = max((nothing.costs[short] - found.costs[short] for _, found, _ in begun), default=0.0)
+    clear = most > CLEAR * allowance(nothing.fit.count, short)
+    followed = []
+    for item, found, found_starts in begun:
+        if clear and nothing.costs[short] - found.costs[short] < NEAR * most:
+            continue
+        search.restart(found_starts)
+        longer = search.climb(found.effects, found.fit.vector, to=horizon, without=nothing, begun=found)
+        followed.append((item, longer))
+    return followed
+
+
 def _promising(search: Search, nothing: Hypothesis, items: list[Ranked]) -> list[Ranked]:
-    """Those that gain most to first order, where a hypothesis that leaves little is fitted without them."""
+    """Those that gain most to first order, where a hypothesis that leaves little is fitted without them.
+
+    What makes no sense beside its parameters, bent as they are, may do so beside others: where it is
+    begun from some size it is among them.
+    """
     tried = list(dict.fromkeys(item.candidate for item in items))
     ranked = search.scored(nothing.fit.vector, nothing.effects, tried, (nothing.horizon,))
-    best = [one.candidate.key for one in ranked[: 2 * SHORT_LIST]]
-    return [item for item in items if item.candidate.key in best]
+    keys = [one.candidate.key for one in ranked]
+    best = keys[: 2 * SHORT_LIST]
+    return [
+        item
+        for item in items
+        if item.candidate.key in best or (item.candidate.key not in keys and any(item.step))
+    ]
 
 
 def _likely(search: Search, base: Hypothesis, items: list[Ranked]) -> list[Ranked]:
@@ -295,7 +325,7 @@ def _likely(search: Search, base: Hypothesis, items: list[Ranked]) -> list[Ranke
     once = search.climb(base.effects, base.fit.vector, to=HORIZONS[0], most=1).fit
     quick = [search.confirm(base, starts, item, HORIZONS[0], most=1).fit.cost for item in items]
     order = sorted(zip(quick, items, strict=True), key=lambda entry: entry[0])
-    limit = once.cost + once.count * WORSE
+    limit = once.cost + max(WORSE * once.count, ASIDE * (once.cost - once.count))
     likely = [item for cost, item in order if cost <= limit][: 2 * SHORT_LIST]
     return [*likely, *(item for cost, item in order if not cost <= limit)]
 
@@ -324,9 +354,12 @@ def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
 
     chosen = tied[0]
     for entry in confirmed:
-        alike = entry[1].effects[-1].count == chosen[1].effects[-1].count
-        if alike and entry[1].strength(chosen[1]) > chosen[1].strength(entry[1]):
-            chosen = entry
+        if entry[1] is chosen[1] or entry[1].effects[-1].count != chosen[1].effects[-1].count:
+            continue
+        first, second = chosen, entry
+        if min(second[1].strength(first[1]), first[1].strength(second[1])) > 0:
+            first, second = _settled(search, first), _settled(search, second)
+        chosen = second if second[1].strength(first[1]) > first[1].strength(second[1]) else first
     further = followed(chosen) if len(tied) > 1 and chosen[1].horizon < HORIZONS[-1] else None
     if further is not None and further.fit.level > FAIR:
         for entry in tied:
@@ -336,6 +369,15 @@ def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
             if other.strength(further) > STRONG and _worth_it(further, other):
                 chosen, further = entry, other
     return chosen
+
+
+def _settled(search: Search, confirmed: Confirmed) -> Confirmed:
+    """The same with what its parameters, better by what longer horizons taught them, leave over the shortest."""
+    strength, found, starts = confirmed
+    search.restart(starts)
+    again = search.climb(found.effects, found.fit.vector, to=HORIZONS[0])
+    short = min(again.costs[HORIZONS[0]], found.costs[HORIZONS[0]])
+    return strength, dataclasses.replace(found, costs=found.costs | {HORIZONS[0]: short}), starts
 
 
 def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:

@@ -46,6 +46,7 @@ ASTRAY = 2.0  # times what is left without an effect: a fit with it that leaves 
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
+SPRING = 0.3  # of the turn by which its link gives way: from there what ties it is begun, beside from none
 FREQUENCIES = 3  # of a periodic disturbance that are tried
 
 
@@ -188,18 +189,21 @@ class Search:
     def climb(
         self, effects: tuple[Candidate, ...], vector: np.ndarray, ceiling: float = np.inf, to: int = HORIZONS[-1],
         iterations: int = 4, most: int = MOST, without: Hypothesis | None = None,
+        begun: Hypothesis | None = None,
     ) -> Hypothesis:  # fmt: skip
-        """Fit over longer and longer horizons; the rest as for `fit`.
+        """Fit over longer and longer horizons, beyond those of `begun` if given; the rest as for `fit`.
 
         Stops where the misfit is above `ceiling`, or far above that of the hypothesis `without` one of
         the effects, which leaves no less unless the fit has gone astray.
         """
         known = {} if without is None else without.costs
         free = freedom(self.parameters, effects)
-        found, costs = None, {}
+        found, costs = (begun.fit, dict(begun.costs)) if begun else (None, {})
         for horizon in HORIZONS:
             if horizon > to:
                 break
+            if horizon in costs:
+                continue
             if found is not None:
                 for run in self.runs:
                     self.problem.join(run, vector)
@@ -302,7 +306,8 @@ class Search:
     def parts(self, effects: tuple[Candidate, ...]) -> list[Ranked]:
         """Every change of a part of the arm that is not yet in `effects`, at nothing.
 
-        A hub's inertia may be many times the nominal one, so it is begun from some sizes.
+        A hub's inertia may be many times the nominal one, so it is begun from some sizes. A spring where a
+        link is tied is begun from one as well: beside it, parameters go on bending where there is none.
         """
         motion = Motion(self.problem, self.runs[0], self.parameters.start)
         taken = {effect.key for effect in effects}
@@ -315,10 +320,12 @@ class Search:
 
     def _sizes(self, part: Candidate) -> list[tuple[float, ...]]:
         nothing = (0.0,) * len(part.amplitudes)
-        if part.effect != "hub_inertia":
-            return [nothing]
-        felt = 1 / self.parameters.lightness[part.index]  # kg m^2
-        return [nothing, *((share * felt,) for share in HUBS)]
+        if part.effect == "hub_inertia":
+            felt = 1 / self.parameters.lightness[part.index]  # kg m^2
+            return [nothing, *((share * felt,) for share in HUBS)]
+        if part.effect in ("joint_flexibility", "root_compliance") and not self.parameters.plays:
+            return [nothing, (SPRING * self.parameters.gives_way(part.index),)]
+        return [nothing]
 
     def _own_places(self, columns: list[int], effect: Candidate) -> list[int]:
         names = (*effect.amplitudes, *effect.free)

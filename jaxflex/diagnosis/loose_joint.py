@@ -12,7 +12,7 @@ import numpy as np
 
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
-from .adopt import adopt
+from .adopt import adopt, amplitudes_of
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .flanks import choose_flanks, press
@@ -57,7 +57,10 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
     """
     found = []
     most = max(1 + LESS * (other.level_of_some() - 1), GONE)
+    soft = _springs(other)
     for joint, own in enumerate(other.file.arm.joints):
+        if soft and joint not in soft:
+            continue  # another one is known to give way
         lumped = any(
             getattr(link, "model", "") == "lumped" for link in other.file.arm.links[joint : joint + 1]
         )
@@ -66,7 +69,8 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
-        for contact, candidate, sizes in ((SPRING, spring, COMPLIANCES), (FLANKS, play, GAPS)):
+        compliances = soft.get(joint, COMPLIANCES)
+        for contact, candidate, sizes in ((SPRING, spring, compliances), (FLANKS, play, GAPS)):
             study = Study(loosened(other.file, joint, contact), recordings, other.held_out, other.search.say)
             few = study.search.thinned()
             fitted = best_from(few, candidate, sizes)
@@ -78,6 +82,16 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         if joined(few, fitted, other).closest < most:
             found.append((study, in_full(study.search, fitted)))
     return found
+
+
+def _springs(study: Study) -> dict[int, tuple[float, ...]]:
+    """Compliances [rad/(N m)] of the springs, taken to follow at once, that were found between motor and link."""
+    final = study.outcome.final
+    return {
+        effect.index: amplitudes_of(study.search.parameters, final.fit.vector, effect)
+        for effect in final.effects
+        if effect.effect == "joint_flexibility"
+    }
 
 
 def joined(search: Search, loose: Hypothesis, other: Study) -> Hypothesis:

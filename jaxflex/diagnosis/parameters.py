@@ -112,6 +112,14 @@ class Parameters:
             if issubclass(EFFECTS[part.effect], AbstractDryFriction) and part.field in ("torque", "level")
         )
 
+    def gives_way(self, link: int) -> float:
+        """How far a force at its tip turns a link about its root, by its first shape [rad/(N m)].
+
+        Of a beam `L / (3 E I)`.
+        """
+        own = self.arm.assemble().links[link]
+        return float(own.tip_deflection[0] ** 2 / (own.stiffness[0] * own.length**2))
+
     @property
     def plays(self) -> dict[int, int]:
         """Places of the gaps of the joints that are loose, by joint."""

@@ -233,6 +233,18 @@ def test_two_large_effects_are_found_though_neither_helps_alone(tmp_path):
     assert sorted(e.name for e in answer(tmp_path).effects) == sorted(pair)
 
 
+@pytest.mark.slow
+def test_a_soft_joint_shares_what_turns_between_motor_and_link(tmp_path):
+    """A spring that follows at once strains the arm's parameters, which make up for the motor's share."""
+    (case,) = make_cases("single_link", [("joint_flexibility",)], [1.0], [14], typical=True)
+    write_case(case, tmp_path)
+    found = answer(tmp_path)
+    assert found.verdict == "missing_effect"
+    assert [e.name for e in found.effects] == ["joint_flexibility"]
+    compliance = found.effects[0].parameters["compliance"]
+    assert abs(compliance.value - 0.1) < 2 * compliance.std < 0.01
+
+
 def test_a_recording_without_its_input_is_refused():
     t = np.linspace(0, 2, 1001)
     recording = jf.Recording(t, {"angle_1": np.sin(t)}, ())

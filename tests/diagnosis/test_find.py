@@ -5,9 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
+from jaxflex.diagnosis.calibrate import Fit, Freedom
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.find import FURTHER, _short_list, confirmed_from, settled_at, sift
-from jaxflex.diagnosis.hypothesis import CLOSE, HORIZONS, Ranked, Search
+from jaxflex.diagnosis.find import (
+    FURTHER,
+    _promising,
+    _short_list,
+    confirmed_from,
+    settled_at,
+    sift,
+    simplest,
+)
+from jaxflex.diagnosis.hypothesis import CLOSE, HORIZONS, Hypothesis, Ranked, Search
+from jaxflex.diagnosis.normal import Normal
 from jaxflex.effects import StribeckFriction, ViscousFriction
 
 SHAPE = (("stribeck_rate", 0.3), ("presliding", 1e-4))
@@ -16,6 +26,8 @@ STRIBECK = Candidate(
 )
 COULOMB = Candidate("coulomb_friction", "joint_1", ("torque",), (("presliding", 1e-4),), ("presliding",))
 DRAG = Candidate("quadratic_drag", "joint_1", ("coefficient",))
+SPRING = Candidate("joint_flexibility", "joint_1", ("compliance",))
+GAIN = Candidate("sensor_gain", "tip_deflection_1", ("gain",))
 
 
 class Misled(Search):
@@ -65,3 +77,70 @@ def test_a_small_change_of_a_part_is_the_likeliest(swung, horizon):
     likeliest = sift(search, base, starts, search.parts(()), horizon)
     assert likeliest[0].candidate.effect == "viscous_friction"
     assert all(run.pieces == len(run.reading) and run.follows[1:].all() for run in search.runs)
+
+
+@pytest.mark.parametrize("friction, all_are", [(2e-5, True), (1e-2, False)])
+def test_parts_far_behind_one_that_leads_clearly_are_not_followed(swung, monkeypatch, friction, all_are):
+    search = swung(ViscousFriction(friction))
+    base, starts = settled_at(search, (), search.parameters.start)
+    parts, followed = search.parts(()), []
+    climb = Search.climb
+
+    def watched(self, effects, *args, begun=None, **options):
+        if begun is not None:
+            followed.append(effects[-1].effect)
+        return climb(self, effects, *args, begun=begun, **options)
+
+    monkeypatch.setattr(Search, "climb", watched)
+    monkeypatch.setattr("jaxflex.diagnosis.find._promising", lambda search, nothing, items: items)
+    sift(search, base, starts, parts, FURTHER)
+    assert "viscous_friction" in followed
+    assert (len(followed) == len(parts)) == all_are
+
+
+def reached(effects, costs):
+    """A hypothesis that came to these costs."""
+    normal = Normal(np.eye(1), np.zeros(1), 0.0, 0.0, 10_000)
+    return Hypothesis(effects, Fit(np.zeros(1), Freedom.full([]), 0.0, 0.0, normal), max(costs), costs)
+
+
+def test_what_makes_no_sense_beside_bent_parameters_is_tried_from_the_size_it_is_begun_with():
+    lag = Candidate("sensor_lag", "angle_1", ("time",))
+    better = [Candidate("sensor_gain", f"angle_{k}", ("gain",)) for k in range(6)]
+    ranked = [Ranked(candidate, (0.1,), 10.0, 2.0) for candidate in (*better, lag)]
+
+    class Ranking(Search):
+        def __init__(self):
+            pass
+
+        def scored(self, *_):
+            return ranked
+
+    sizes = [
+        (SPRING, 0.0),
+        (SPRING, 0.1),
+        *((candidate, 0.0) for candidate in better),
+        (lag, 0.0),
+        (lag, 0.1),
+    ]
+    items = [Ranked(candidate, (size,), 0.0, 0.0) for candidate, size in sizes]
+    assert _promising(Ranking(), reached((), {1: 1e4}), items) == items[1:-2]
+
+
+def test_rivals_that_lead_over_different_horizons_are_settled_before_one_is_chosen():
+    """A fit over a tenth of a second may end far up a valley that a second leads out of."""
+
+    class Settling(Search):
+        def __init__(self):
+            pass
+
+        def restart(self, starts):
+            pass
+
+        def climb(self, effects, vector, to):
+            return reached(effects, {1: {SPRING: 8.22e3, GAIN: 8.26e3}[effects[-1]]})
+
+    gain, spring = reached((GAIN,), {1: 8.26e3, 10: 9.09e3}), reached((SPRING,), {1: 8.37e3, 10: 8.94e3})
+    assert gain.strength(spring) > spring.strength(gain) > 0
+    _, chosen, _ = simplest(Settling(), [(200.0, gain, []), (200.1, spring, [])])
+    assert chosen.effects == (SPRING,) and chosen.costs == {1: 8.22e3, 10: 8.94e3}
