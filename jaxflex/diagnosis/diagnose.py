@@ -11,7 +11,7 @@ from .estimates import drop_unseen, unseen
 from .find import HALFWAY, find, find_from
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, PROMISING, by_gauge
-from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG
+from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG, Hypothesis
 from .loose_joint import is_of_loose_joint, loose_joints
 from .prepare import HeldOut
 from .result import Diagnosis
@@ -95,13 +95,13 @@ def _has_not_seen(study: Study) -> bool:
     """True if what is held out leaves a gap where nothing is left in what was searched.
 
     A small gap says so where no effect was named, whose form could be to blame, or where the arm's
-    parameters went farther than they should.
+    parameters went farther than they should, for what was searched or for all.
     """
     outcome, left = study.outcome, study.foretold().level
     if outcome.level >= FAIR:
         return False
-    if outcome.final.effects and not is_bent(study.search.parameters, outcome.final, outcome.explained):
-        return left > AT_FLOOR
+    if outcome.final.effects and not _is_bent(study) and left < AT_FLOOR:
+        return _is_bent(study, study.everything()) and left > outcome.level + UNSEEN
     return left > outcome.level + UNSEEN
 
 
@@ -119,13 +119,18 @@ def _leaves_much(study: Study) -> bool:
     """True if what was found leaves a gap, or had to bend the arm's parameters to close it."""
     outcome = study.outcome
     much = outcome.level > FAIR and outcome.level - 1 > LITTLE * (outcome.nominal_level - 1)
-    return much or is_bent(study.search.parameters, outcome.final, outcome.explained) or _is_strained(study)
+    return much or _is_bent(study) or _is_strained(study)
+
+
+def _is_bent(study: Study, found: Hypothesis | None = None) -> bool:
+    """True if the arm's parameters had to bend for the final hypothesis, or for `found`."""
+    return is_bent(study.search.parameters, found or study.outcome.final, study.outcome.explained)
 
 
 def _is_strained(study: Study) -> bool:
     """True if a joint is soft, and the arm's parameters make up for what turns on the motor's side of it."""
     soft = any(effect.effect == "joint_flexibility" for effect in study.outcome.final.effects)
-    return soft and is_bent(study.search.parameters, study.everything(), study.outcome.explained)
+    return soft and _is_bent(study, study.everything())
 
 
 def _solves(loose: Study, other: Study) -> bool:
