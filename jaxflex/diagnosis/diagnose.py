@@ -138,9 +138,7 @@ def _solves(loose: Study, other: Study) -> bool:
     left = loose.foretold().level
     if _is_strained(other) and not _is_strained(loose) and left < max(AT_FLOOR, other.foretold().level):
         return True
-    # of a bare axis the load is never seen, and its starts fit much that is something else
-    seen = bool(loose.file.arm.links) or left < AT_FLOOR
     gone = left - 1 < SOLVED * (other.foretold().level - 1)
-    if not (gone and seen and loose.outcome.final.strength(other.outcome.final) > STRONG):
+    if not (gone and loose.outcome.final.strength(other.outcome.final) > STRONG):
         return False
     return not any(is_of_loose_joint(loose.search.parameters, effect) for effect in unseen(loose))

@@ -13,12 +13,11 @@ from .shooting import Problem
 def press(problem: Problem, runs: list[Run], vector: np.ndarray, joint: int) -> None:
     """Start every piece with the flank pressed that the moment of the bent link presses.
 
-    Where nothing bends, with that from which the piece fits better.
+    Where nothing bends, a load is where the piece before leaves it.
     """
-    link = problem.setting.parameters.arm.assemble().links[joint]
-    if link.shapes == 1:
-        choose_flanks(problem, runs, vector, joint)
+    if problem.setting.hidden:
         return
+    link = problem.setting.parameters.arm.assemble().links[joint]
     twist, gap = _play(problem, vector, joint)
     curvature = np.array([float(c) for c in link.gauge_curvature])
     for run in runs:

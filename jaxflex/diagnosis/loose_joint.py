@@ -16,7 +16,7 @@ from .adopt import adopt, amplitudes_of
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .flanks import choose_flanks, press
-from .hypothesis import CLOSE, Hypothesis, Search, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom
 from .parameters import Parameters
 from .shooting import LOST_PIECE
 from .study import Study
@@ -33,6 +33,13 @@ SPRING = {  # the same, of a joint whose flexibility is all there is: hard flank
 }
 COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
+HIDDEN_GAPS = (
+    0.002,
+    0.004,
+    0.008,
+    0.016,
+    0.032,
+)  # rad; the same of a load that nothing shows, from half to twice
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
 LESS = 0.5  # of the misfit over the shortest horizon beyond the noise: what a loose joint may leave
 TURNS = 3  # of trying the other flank and fitting again
@@ -52,6 +59,8 @@ def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]])
 def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[Study, Hypothesis]]:
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
+    Of a bare axis both.
+
     Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
     that `other` found, leaves far less than `other` does: else it is left out.
     """
@@ -70,17 +79,25 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
         compliances = soft.get(joint, COMPLIANCES)
-        for contact, candidate, sizes in ((SPRING, spring, compliances), (FLANKS, play, GAPS)):
-            study = Study(loosened(other.file, joint, contact), recordings, other.held_out, other.search.say)
-            few = study.search.thinned()
+        gaps = GAPS if other.file.arm.links else HIDDEN_GAPS
+        for contact, candidate, sizes in ((SPRING, spring, compliances), (FLANKS, play, gaps)):
+            study = Study(
+                loosened(other.file, joint, contact), recordings, other.held_out, other.search.say,
+                carried=candidate is play,
+            )  # fmt: skip
+            # where in its play a load is that nothing shows, only the pieces before say
+            few = study.search.thinned(HORIZONS[-1] if study.prepared.problem.setting.hidden else 1)
             fitted = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             tried.append((study, few, fitted))
             if other.file.arm.links and fitted.fit.level < GONE:
                 break
-        study, few, fitted = min(tried, key=lambda entry: entry[2].fit.cost)
-        if joined(few, fitted, other).closest < most:
-            found.append((study, in_full(study.search, fitted)))
+        if other.file.arm.links:
+            tried = [min(tried, key=lambda entry: entry[2].fit.cost)]
+        # starts that are free flatter a spring before a load that nothing shows: both are gone on with
+        for study, few, fitted in tried:
+            if joined(few, fitted, other).closest < most:
+                found.append((study, in_full(study.search, fitted)))
     return found
 
 

@@ -80,6 +80,18 @@ def bristles(model: AssembledArm) -> slice:
     return slice(first, first + len(model.joints))
 
 
+def hidden_loads(model: AssembledArm) -> list[int]:
+    """Where in the state of a piece the loads behind loose joints are, and their rates, where nothing bends.
+
+    No reading shows such a load but by what it does to the motor.
+    """
+    ends = np.cumsum([link.shapes for link in model.links], dtype=int) + len(model.joints) - 1
+    twists = [
+        int(end) for end, link in zip(ends, model.links, strict=True) if link.loose and link.shapes == 1
+    ]
+    return [*twists, *(model.size + twist for twist in twists)]
+
+
 def _split(model: AssembledArm, x: tuple):
     n, joints, bent = model.size, len(model.joints), bristles(model)
     warm = bent.start - joints

@@ -18,7 +18,7 @@ from ..files.recording import Recording, RecordingError
 from .catalogue import template
 from .noise import noise_floors
 from .parameters import Parameters
-from .plant import bristles, state_size, substeps_for
+from .plant import bristles, hidden_loads, state_size, substeps_for
 from .runs import Run
 from .shooting import Problem, Setting
 
@@ -86,11 +86,15 @@ def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]
 
 
 def make_problem(
-    file: ArmFile, recordings: Sequence[Recording], held_out: HeldOut = HeldOut.RUNS
+    file: ArmFile,
+    recordings: Sequence[Recording],
+    held_out: HeldOut = HeldOut.RUNS,
+    carried: bool = False,
 ) -> Prepared:
     """Check the recordings, find their noise, cut them into pieces.
 
     `held_out`: what a diagnosis is judged by; of a single recording its end, where whole runs are asked for.
+    `carried`: loads that no reading shows go on from piece to piece, and begin none where it suits them.
 
     **Raises** `RecordingError` if an input or every output is missing, or too little is left.
     """
@@ -128,7 +132,9 @@ def make_problem(
     model = parameters.arm.assemble()
     spread = np.full(state_size(model, outputs), 1e3)
     spread[bristles(model)] = UNSEEN
-    setting = Setting(parameters, outputs, np.array(noise), colour, step, length, substeps, spread)
+    hidden = hidden_loads(model) if carried else []
+    spread[hidden] = UNSEEN
+    setting = Setting(parameters, outputs, np.array(noise), colour, step, length, substeps, spread, hidden)
     if len(pieces) > 1 and held_out is HeldOut.RUNS:
         runs = [make_run(piece, inputs, setting) for piece in pieces]
         count = (len(runs) + 1) // 2

@@ -29,6 +29,7 @@ from .steps import FEW_LANES, LANES, Intervals, Point, Steps, along_pieces
 
 LOST_PIECE = 2.0  # misfit of a piece, and by how much another start must better it
 SWEEPS = 2  # from piece to piece, when they are joined
+EVERYTHING = slice(None)
 MOST_SUBSTEPS = 24  # in a sample, where a contact is stiff
 SLIDES = 0.9999  # of its farthest: how far a bristle is bent while a joint slides
 DRY_PASSES = 2  # of a substep of one joint: the second knows the friction that the first one found
@@ -47,6 +48,7 @@ class Setting:
     length: int  # samples in a piece
     substeps: int
     start_spread: np.ndarray  # how far a start may be from what was guessed, (states,)
+    hidden: list[int]  # places in a start of what goes on from piece to piece, no reading showing it
 
 
 def _stacked(columns: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
@@ -329,33 +331,38 @@ class Problem:
         return bool(better.any())
 
     def bend(self, run: Run, vector: np.ndarray) -> None:
-        """Begin every piece with the bristles of dry friction as the piece before leaves them.
+        """Begin every piece with the bristles of dry friction, and hidden loads, as the piece before leaves them.
 
-        No reading sees them, and left free they would make up for friction that is missing.
+        No reading sees them, and left free they would make up for friction that is missing, or for play.
         """
         if self.setting.parameters.has_dry_friction(vector):
             ends = self.predict(run, vector).end[:-1, self._bristles]
             bent = np.where(np.isfinite(ends), np.clip(ends, -1, 1), 0.0)
             own = run.starts[1:, self._bristles]
             run.starts[1:, self._bristles] = np.where(run.follows[1:, None], bent, own)
+        if self.setting.hidden:
+            self.join(run, vector, self.setting.hidden)
 
-    def join(self, run: Run, vector: np.ndarray) -> None:
+    def join(self, run: Run, vector: np.ndarray, places: slice | list[int] = EVERYTHING) -> None:
         """Move every start to where the piece before ends, unless that fits clearly worse.
 
         What no reading sees of a start, such as where in its play a joint is, is then one
-        motion, which linear algebra can join over a longer horizon.
+        motion, which linear algebra can join over a longer horizon. `places` of a start that move.
         """
         for _ in range(SWEEPS):
-            ends, here, there = self._from_before(run, vector)
+            ends, here, there = self._from_before(run, vector, places)
             run.starts = np.where((there < LOST_PIECE * here)[:, None], ends, run.starts)
 
-    def _from_before(self, run: Run, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _from_before(
+        self, run: Run, vector: np.ndarray, places: slice | list[int] = EVERYTHING
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the pieces before end, and misfits of every piece from its own start and from there."""
         response = self.predict(run, vector)
-        ends = np.where(run.follows[1:, None], response.end[:-1], run.starts[1:])
-        other = dataclasses.replace(run, starts=np.concatenate([run.starts[:1], ends]))
+        starts = run.starts.copy()
+        starts[1:, places] = np.where(run.follows[1:, None], response.end[:-1, places], starts[1:, places])
+        other = dataclasses.replace(run, starts=starts)
         there = self.misfit(other, self.predict(other, vector))
-        return other.starts, self.misfit(run, response), there
+        return starts, self.misfit(run, response), there
 
     def misfit(self, run: Run, response: Response) -> np.ndarray:
         """Mean square of what the readings of each piece differ from `response`, in units of the noise."""

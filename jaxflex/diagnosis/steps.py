@@ -124,7 +124,8 @@ class Intervals:
         tables = []
         for parts in self._tables(self._imbalance, self.everywhere, tangents):
             push, heating, before, after = map(self._whole, parts)
-            table = steps.by_input[..., -push.shape[2] :] @ push
+            with np.errstate(all="ignore"):  # a motion may be lost
+                table = steps.by_input[..., -push.shape[2] :] @ push
             moving, joints, channels = steps.by_state.shape[-1], heating.shape[2], before.shape[2]
             table[:, :, moving - 2 * joints : moving - joints] += self.pieces.sample_time * heating
             table[:, :, moving : moving + channels] += before

@@ -18,15 +18,22 @@ Say = Callable[[str], None]
 class Study:
     """An arm and the recordings prepared for it; `outcome` is what a search found.
 
-    `held_out`: what the search does not see, and is judged by.
+    `held_out`: what the search does not see, and is judged by; `carried` as for `make_problem`.
     """
 
     outcome: Outcome
 
-    def __init__(self, file: ArmFile, recordings: Sequence[Recording], held_out: HeldOut, say: Say):
+    def __init__(
+        self,
+        file: ArmFile,
+        recordings: Sequence[Recording],
+        held_out: HeldOut,
+        say: Say,
+        carried: bool = False,
+    ):
         self.file = file
         self.held_out = held_out
-        self.prepared = make_problem(file, recordings, held_out)
+        self.prepared = make_problem(file, recordings, held_out, carried)
         self.search = Search(self.prepared.problem, self.prepared.calibration, say)
         self.notes = self.prepared.notes
         self._foretold: tuple[Hypothesis, Foretold] | None = None

@@ -2,13 +2,18 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxflex as jf
+from controllers import Replayed, Step
+from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.hypothesis import HORIZONS
 from jaxflex.diagnosis.loose_joint import FLANKS, best_from, loosened
+from jaxflex.diagnosis.plant import hidden_loads
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
 from jaxflex.files.arm_file import ArmFile
@@ -40,6 +45,49 @@ def test_play_is_found_from_a_third_and_from_three_times_its_size(study, size):
     over_a_second = study.search.climb(found.effects, found.fit.vector)
     assert over_a_second.horizon == HORIZONS[-1] and over_a_second.fit.level < 1.1
     np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.01)
+
+
+@pytest.fixture(scope="module")
+def axis():
+    """A bare axis taken apart, and what one with play showed: its motor's angle alone."""
+    motor = jf.DCMotor(1.2, 0.06, 0.06)
+    arm = jf.Arm((), (jf.Joint(hub_inertia=2e-3, viscous_friction=1e-3, motor=motor),), drive="voltage")
+    loose = dataclasses.replace(
+        arm.joints[0], play=GAP, contact_stiffness=60.0, contact_damping=0.1, motor_share=0.5
+    )
+    times = jnp.linspace(0.0, 4.0, 2001)
+    voltage = 2.0 * jnp.sin(5.0 * times) + 1.0 * jnp.sin(11.0 * times)
+    true = dataclasses.replace(arm, joints=(loose,))
+    run = jf.simulate(true, Replayed(voltage[:, None], 0.002), Step((0.0,), (0.0,)), times)
+    noise = 1e-4 * np.random.default_rng(0).normal(size=len(times))
+    channels = {"voltage_1": np.asarray(run["voltage_1"]), "angle_1": np.asarray(run["angle_1"]) + noise}
+    recording = jf.Recording(np.asarray(times), channels, ())
+    file = loosened(ArmFile(arm, {"default": 0.01}, None), 0, FLANKS)
+    return Study(file, [recording], HeldOut.ENDS, lambda line: None, carried=True)
+
+
+def test_a_load_that_nothing_shows_goes_on_from_piece_to_piece(axis, study):
+    problem, run = axis.prepared.problem, axis.prepared.calibration[0]
+    hidden = problem.setting.hidden
+    assert hidden == [1, 3] and hidden_loads(study.search.parameters.arm.assemble()) == []
+    assert (problem.setting.start_spread[hidden] < 1e-5).all()
+    vector = adopt(axis.search.parameters, axis.search.parameters.start, PLAY, (GAP,))
+    shown = run.starts[:, [0, 2]].copy()
+    for _ in range(len(run.starts)):
+        problem.bend(run, vector)
+    ends = problem.predict(run, vector).end[:-1][:, hidden]
+    gone_on = np.abs(run.starts[1:][:, hidden] - ends).max(1) < 1e-4
+    assert gone_on.mean() > 0.6  # the others would fit clearly worse
+    np.testing.assert_array_equal(run.starts[:, [0, 2]], shown)
+
+
+@pytest.mark.parametrize("size", [GAP / 2, pytest.param(2 * GAP, marks=pytest.mark.slow)])
+def test_play_before_a_load_that_nothing_shows_is_found(axis, size):
+    found = best_from(axis.search, PLAY, (size,))
+    over_a_second = axis.search.climb(found.effects, found.fit.vector)
+    assert over_a_second.horizon == HORIZONS[-1] and over_a_second.fit.level < 1.1
+    place = axis.search.parameters.position("backlash", "joint_1", "gap")
+    np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.02)
 
 
 def test_harder_flanks_take_more_steps(study):
