@@ -33,13 +33,8 @@ SPRING = {  # the same, of a joint whose flexibility is all there is: hard flank
 }
 COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
-HIDDEN_GAPS = (
-    0.002,
-    0.004,
-    0.008,
-    0.016,
-    0.032,
-)  # rad; the same of a load that nothing shows, from half to twice
+# rad; before a load that nothing shows a fit finds its way from half, and from twice
+HIDDEN_GAPS = (0.002, 0.004, 0.008, 0.016, 0.032)
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
 LESS = 0.5  # of the misfit over the shortest horizon beyond the noise: what a loose joint may leave
 TURNS = 3  # of trying the other flank and fitting again
@@ -59,10 +54,9 @@ def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]])
 def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[Study, Hypothesis]]:
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
-    Of a bare axis both.
-
     Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
-    that `other` found, leaves far less than `other` does: else it is left out.
+    that `other` found, leaves far less than `other` does: else it is left out. Where nothing bends behind
+    the joint, both: starts that are free flatter a spring before a load that nothing shows.
     """
     found = []
     most = max(1 + LESS * (other.level_of_some() - 1), GONE)
@@ -70,31 +64,30 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
     for joint, own in enumerate(other.file.arm.joints):
         if soft and joint not in soft:
             continue  # another one is known to give way
-        lumped = any(
-            getattr(link, "model", "") == "lumped" for link in other.file.arm.links[joint : joint + 1]
-        )
-        if lumped or own.play is not None:
+        behind = other.file.arm.links[joint : joint + 1]
+        if any(getattr(link, "model", "") == "lumped" for link in behind) or own.play is not None:
             continue
+        bends = any(link.modes > 0 for link in behind)
         spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
         compliances = soft.get(joint, COMPLIANCES)
-        gaps = GAPS if other.file.arm.links else HIDDEN_GAPS
-        for contact, candidate, sizes in ((SPRING, spring, compliances), (FLANKS, play, gaps)):
+        for contact, candidate, sizes in (
+            (SPRING, spring, compliances), (FLANKS, play, GAPS if bends else HIDDEN_GAPS)
+        ):  # fmt: skip
             study = Study(
                 loosened(other.file, joint, contact), recordings, other.held_out, other.search.say,
                 carried=candidate is play,
             )  # fmt: skip
             # where in its play a load is that nothing shows, only the pieces before say
-            few = study.search.thinned(HORIZONS[-1] if study.prepared.problem.setting.hidden else 1)
+            few = study.search.thinned(1 if bends or candidate is spring else HORIZONS[-1])
             fitted = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             tried.append((study, few, fitted))
-            if other.file.arm.links and fitted.fit.level < GONE:
+            if bends and fitted.fit.level < GONE:
                 break
-        if other.file.arm.links:
+        if bends:
             tried = [min(tried, key=lambda entry: entry[2].fit.cost)]
-        # starts that are free flatter a spring before a load that nothing shows: both are gone on with
         for study, few, fitted in tried:
             if joined(few, fitted, other).closest < most:
                 found.append((study, in_full(study.search, fitted)))
