@@ -122,17 +122,28 @@ def test_what_shows_at_the_end_alone_is_named():
 
 
 @pytest.mark.parametrize(
-    "searched, held_out, named, seen",
-    [(1.0, 1.03, False, True), (0.9, 1.0, False, False), (1.0, 1.5, True, True), (1.0, 2.5, True, False)],
+    "searched, held_out, named, strained, seen",
+    [
+        (1.0, 1.03, False, False, True),
+        (0.9, 1.0, False, False, False),
+        (1.0, 1.5, True, False, True),
+        (1.0, 1.5, True, True, False),
+        (1.0, 1.03, True, True, True),
+        (1.0, 2.5, True, False, False),
+    ],
 )
-def test_a_small_gap_in_what_is_held_out_counts_where_nothing_was_named(
-    recorded, monkeypatch, searched, held_out, named, seen
+def test_a_small_gap_in_what_is_held_out_counts_where_nothing_was_named_or_all_strains_the_arm(
+    recorded, monkeypatch, searched, held_out, named, strained, seen
 ):
     study = Study(*recorded(), HeldOut.ENDS, lambda line: None)
     final = study.search.climb((), study.search.parameters.start, to=1)
     final.effects = (Candidate("quadratic_drag", "joint_1", ("coefficient",)),) * named
-    study.outcome = Outcome(final, [], 10.0)
+    study.outcome = Outcome(final, study.search.starts(), 10.0)
     study.outcome.level = searched
+    moved = final.fit.vector.copy()
+    moved[: len(study.search.parameters.nominal)] = 5.0 * strained
+    everything = dataclasses.replace(final, fit=dataclasses.replace(final.fit, vector=moved))
+    monkeypatch.setattr(study, "everything", lambda: everything)
     monkeypatch.setattr(study, "foretold", lambda: SimpleNamespace(level=held_out))
     assert _has_not_seen(study) is not seen
 
