@@ -98,11 +98,11 @@ def _has_not_seen(study: Study) -> bool:
     parameters went farther than they should, for what was searched or for all.
     """
     outcome, left = study.outcome, study.foretold().level
-    if outcome.level >= FAIR:
+    if outcome.level >= FAIR or left <= outcome.level + UNSEEN:
         return False
-    if outcome.final.effects and not _is_bent(study) and left < AT_FLOOR:
-        return _is_bent(study, study.everything()) and left > outcome.level + UNSEEN
-    return left > outcome.level + UNSEEN
+    if left > AT_FLOOR or not outcome.final.effects:
+        return True
+    return _is_bent(study) or _is_bent(study, study.everything())
 
 
 def _deflections(study: Study) -> list[str]:

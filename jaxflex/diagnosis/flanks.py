@@ -6,8 +6,9 @@ No reading shows it, and a fit by slopes does not cross the gap: the other flank
 import numpy as np
 
 from .hypothesis import restart, settle, starts_of
+from .plant import twist_place
 from .runs import Run
-from .shooting import Problem
+from .shooting import LOST_PIECE, Problem
 
 
 def press(problem: Problem, runs: list[Run], vector: np.ndarray, joint: int) -> None:
@@ -25,10 +26,8 @@ def press(problem: Problem, runs: list[Run], vector: np.ndarray, joint: int) -> 
         run.starts[:, twist] = np.sign(bent) * gap / 2
 
 
-def choose_flanks(
-    problem: Problem, runs: list[Run], vector: np.ndarray, joint: int, lost: float = 0.0
-) -> None:
-    """Start the pieces whose misfit is beyond `lost` at one flank or the other, where that fits better."""
+def choose_flanks(problem: Problem, runs: list[Run], vector: np.ndarray, joint: int) -> None:
+    """Start the pieces that are lost at one flank or the other, where that fits better."""
     twist, gap = _play(problem, vector, joint)
 
     def misfits() -> list[np.ndarray]:
@@ -39,7 +38,7 @@ def choose_flanks(
     for side in (-gap / 2, gap / 2):
         restart(runs, first)
         for run, misfit in zip(runs, before, strict=True):
-            run.starts[misfit > lost, twist] = side
+            run.starts[misfit > LOST_PIECE, twist] = side
         settle(problem, runs, vector)
         for k, (run, misfit) in enumerate(zip(runs, misfits(), strict=True)):
             better = misfit < best[k][1]
@@ -51,6 +50,4 @@ def choose_flanks(
 def _play(problem: Problem, vector: np.ndarray, joint: int) -> tuple[int, float]:
     """The coordinate of what lies between motor and link of a joint that was taken apart, and its gap."""
     parameters = problem.setting.parameters
-    model = parameters.arm.assemble()
-    twist = len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1
-    return twist, float(vector[parameters.plays[joint]])
+    return twist_place(parameters.arm.assemble(), joint), float(vector[parameters.plays[joint]])

@@ -12,7 +12,7 @@ from .chains import whitened
 from .flanks import choose_flanks
 from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
 from .runs import Run
-from .shooting import LOST_PIECE, Problem
+from .shooting import Problem
 
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 
@@ -56,7 +56,7 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
             found = fit(problem, [run], vector, held, horizon, 4)
             vector = found.vector
             for joint in plays if horizon == HORIZONS[0] else ():
-                choose_flanks(problem, [run], vector, joint, LOST_PIECE)
+                choose_flanks(problem, [run], vector, joint)
         reading = problem.predict(run, vector).reading
         lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
         # a motion that cannot be followed counts as if nothing had been foretold of it

@@ -18,7 +18,6 @@ from .catalogue import Candidate
 from .flanks import choose_flanks, press
 from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom
 from .parameters import Parameters
-from .shooting import LOST_PIECE
 from .study import Study
 
 FLANKS = {  # of CONTACT: value, and relative uncertainty
@@ -142,7 +141,7 @@ def in_full(search: Search, fitted: Hypothesis) -> Hypothesis:
     search.settle(search.parameters.start)
     _settle(search, candidate, fitted.fit.vector)
     if candidate.effect == "backlash":
-        choose_flanks(search.problem, search.runs, fitted.fit.vector, candidate.index, LOST_PIECE)
+        choose_flanks(search.problem, search.runs, fitted.fit.vector, candidate.index)
     return _climb(search, candidate, fitted.fit.vector)
 
 
@@ -185,7 +184,7 @@ def turned(search: Search, fitted: Hypothesis, joint: int) -> Hypothesis:
         if fitted.fit.level < CLOSE:
             break
         starts = search.starts()
-        choose_flanks(search.problem, search.runs, fitted.fit.vector, joint, LOST_PIECE)
+        choose_flanks(search.problem, search.runs, fitted.fit.vector, joint)
         again = search.climb(fitted.effects, fitted.fit.vector, to=1, iterations=8)
         if not again.fit.cost < HELPS * fitted.fit.cost:
             search.restart(starts)

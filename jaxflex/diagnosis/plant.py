@@ -80,15 +80,18 @@ def bristles(model: AssembledArm) -> slice:
     return slice(first, first + len(model.joints))
 
 
+def twist_place(model: AssembledArm, joint: int) -> int:
+    """Which coordinate is what lies between motor and link of a joint that is loose."""
+    return len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1
+
+
 def hidden_loads(model: AssembledArm) -> list[int]:
     """Where in the state of a piece the loads behind loose joints are, and their rates, where nothing bends.
 
     No reading shows such a load but by what it does to the motor.
     """
-    ends = np.cumsum([link.shapes for link in model.links], dtype=int) + len(model.joints) - 1
-    twists = [
-        int(end) for end, link in zip(ends, model.links, strict=True) if link.loose and link.shapes == 1
-    ]
+    hidden = [joint for joint, link in enumerate(model.links) if link.loose and link.shapes == 1]
+    twists = [twist_place(model, joint) for joint in hidden]
     return [*twists, *(model.size + twist for twist in twists)]
 
 
