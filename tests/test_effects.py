@@ -20,6 +20,7 @@ from jaxflex.effects import (
     LoadTorqueBias,
     RootCompliance,
 )
+from jaxflex.effects.friction import SMALL, fading
 
 SIZE = {
     "gap": 0.01, "limit": 2.0, "width": 0.3, "delay": 0.01, "change": 0.02, "mass": 0.02,
@@ -230,6 +231,33 @@ def test_a_bristle_holds_an_axis_as_a_spring_of_its_slope():
     run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start)
     w = np.sqrt(0.2 / 2e-3 / 0.1)
     np.testing.assert_allclose(run["angle_1"], 1e-4 / w * np.sin(w * times), atol=3e-8)
+
+
+def test_a_damped_bristle_holds_an_axis_as_a_damped_spring():
+    """Small motion at rest: a spring `T / s` with the damping `d T / s`."""
+    damping, inertia = 5e-3, 0.1
+    bristle = CoulombFriction(0.2, 1e-9, presliding=2e-3, bristle_damping=damping)
+    arm = jf.Arm((), (jf.Joint(hub_inertia=inertia),), effects=(bristle,))
+    start, times = jf.InitialState(rates=jnp.array([1e-5])), jnp.linspace(0.0, 0.4, 101)
+    run = jf.simulate(arm, OpenLoop(), Step((0.0,), (0.0,)), times, initial=start)
+    stiffness = 0.2 / 2e-3
+    decay = damping * stiffness / (2 * inertia)
+    w = np.sqrt(stiffness / inertia - decay**2)
+    np.testing.assert_allclose(
+        run["angle_1"], 1e-5 / w * np.exp(-decay * times) * np.sin(w * times), atol=3e-9
+    )
+
+
+def test_stribecks_rise_has_the_forms_in_use():
+    """`exp(-x^2)` without a tail, `1 / (1 + x^2)` with a whole one, in between with derivatives."""
+    x, one = jnp.linspace(0.0, 4.0, 41), jnp.ones(())
+    f = jax.vmap(fading, (0, None))
+    np.testing.assert_allclose(f(x, 0.0 * one), np.exp(-(x**2)), rtol=1e-12)
+    np.testing.assert_allclose(f(x, one), 1 / (1 + x**2), rtol=1e-12)
+    slope = jax.vmap(lambda x: jax.grad(fading, 1)(x, 0.0 * one))(x)
+    np.testing.assert_allclose(slope, x**4 / 2 * np.exp(-(x**2)), atol=1e-12)
+    near, far = (f(x, SMALL / x[-1] ** 2 * share) for share in (0.999, 1.001))
+    assert float(jnp.max(jnp.abs(near - far))) < 1e-7  # the series meets what it stands for
 
 
 def test_a_bristle_takes_energy_over_a_cycle_and_loses_less_in_small_ones():

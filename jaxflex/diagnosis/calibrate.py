@@ -3,6 +3,7 @@
 # arrays of numpy go to JAX and come back, which its annotations do not foresee
 # pyright: reportArgumentType=false, reportOptionalMemberAccess=false
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,10 @@ WALL = 25.0  # steepness of a prior beyond what it allows, in its own precision
 RAN_AWAY = 4.0  # growth of the misfit of a piece in one step
 BELIED = 1.5  # growth of the cost over an iteration, as the next slopes see it, at which it is taken back
 REFUSALS = 3  # in a row, at which a fit ends
+ANEW = 4.0  # misfit of a piece, and times that of most: it may have settled on the wrong side of a friction
+ENOUGH = 3  # iterations of a fit that is to end where nothing more is gained
+MUCH = 0.3  # of all misfit: what such pieces must have to begin anew
+ROUNDS = 2  # in which they do
 STEEPEST = 1e4  # damping beyond which a fit has nowhere to go
 
 
@@ -91,8 +96,53 @@ def fit(
     that hold have nothing more to gain, when an iteration gains less than `tolerance` a reading,
     or, after `iterations` of them, less than the share SLOW of the cost. Pieces that run away in
     a step stay where they were; over longer horizons, whose cost rests on the slopes, an iteration
-    that the next slopes belie is taken back and tried again with more damping.
+    that the next slopes belie is taken back and tried again with more damping. Pieces that dry
+    friction leaves astray at the end begin anew.
     """
+    found = _descended(problem, runs, vector, freedom, horizon, iterations, tolerance, fresh, most)
+    if horizon > 1 or min(iterations, most) < ENOUGH:
+        return found
+    for _ in range(ROUNDS):
+        if not any([begun_anew(problem, run, found.vector) for run in runs]):
+            break
+        before = found.cost
+        found = _descended(problem, runs, found.vector, freedom, 1, iterations, tolerance, fresh, most)
+        if not found.cost < (1 - SLOW) * before:
+            break
+    return found
+
+
+def begun_anew(problem: Problem, run: Run, vector: np.ndarray) -> bool:
+    """Start pieces that went astray under dry friction from what their readings tell; true if any fits better so.
+
+    Where a joint sticks and turns, what a start leaves has more than one valley.
+    """
+    if not problem.setting.parameters.has_dry_friction(vector):
+        return False
+    here = problem.misfit(run, problem.predict(run, vector))
+    astray = here > ANEW * max(1.0, float(np.median(here)))
+    if not here[astray].sum() > MUCH * here.sum():
+        return False
+    starts = np.where(astray[:, None], run.measured, run.starts)
+    other = dataclasses.replace(run, starts=starts, slopes=None)
+    _descended(problem, [other], vector, Freedom.full([]), 1, 2)
+    better = astray & (problem.misfit(other, problem.predict(other, vector)) < here)
+    run.starts = np.where(better[:, None], other.starts, run.starts)
+    return bool(better.any())
+
+
+def _descended(
+    problem: Problem,
+    runs: list[Run],
+    vector: np.ndarray,
+    freedom: Freedom,
+    horizon: int,
+    iterations: int,
+    tolerance: float = 3e-4,
+    fresh: bool = False,
+    most: int = MOST,
+) -> Fit:
+    """The fit, pieces left where they went."""
     vector = vector.copy()
     columns = list(freedom.columns)
 

@@ -27,7 +27,10 @@ from .shooting import Problem
 ORDERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36)  # of cogging, periods a turn
 WAVES = 1.0  # of a ripple that the motion must span
 STRIBECK = (0.03, 0.1, 0.3)  # of the rms speed
-BENDING_TIME = 1e-4  # s at a joint's typical rate: how far dry friction bends, at a first guess
+BENDING_TIME = 4e-4  # s at a joint's typical rate: how far dry friction bends, at a first guess
+BRISTLE_DAMPING = 1e-4  # s, at a first guess
+TAIL = 0.5  # of Stribeck's friction, between the two forms in use, at a first guess
+FORM = ("presliding", "bristle_damping", "tail")  # of dry friction: how, not how much
 SIGN = 2e-6  # of a joint's typical rate: where the sign of friction changes, the bristle aside; it never rests there
 RIGID_SIGN = 2e-3  # the same of a law without a bristle, narrow enough to integrate
 LEAST_RISE = 0.05  # of friction towards rest, of its level: below it there is none
@@ -52,8 +55,8 @@ class Candidate:
 
     @property
     def count(self) -> int:
-        """Number of parameters that a fit may choose, how friction changes its sign left aside."""
-        return len(self.amplitudes) + sum(name != "presliding" for name in self.free)
+        """Number of parameters that a fit may choose, the form of friction left aside."""
+        return len(self.amplitudes) + sum(name not in FORM for name in self.free)
 
     @property
     def index(self) -> int:
@@ -137,8 +140,8 @@ def candidates(
         if name == "stribeck_friction":
             for share in STRIBECK:
                 rate = share * max(motion.rms_rate(effect.index) for motion in motions)
-                shape = (("stribeck_rate", rate), ("presliding", float(effect.presliding)))
-                yield Candidate(name, location, ("torque", "level"), shape, ("stribeck_rate", "presliding"))
+                shape = (("stribeck_rate", rate), ("tail", TAIL), *_bristle(effect))
+                yield Candidate(name, location, ("torque", "level"), shape, tuple(dict(shape)))
         elif name == "cogging_torque":
             for order in ORDERS:
                 if order * max(motion.range(effect.index) for motion in motions) < WAVES * 2 * np.pi:
@@ -163,10 +166,14 @@ def candidates(
         elif name == "cable_stiffness":
             yield Candidate(name, location, ("stiffness",), (("rest_angle", 0.0),), ("rest_angle",))
         elif name in ("coulomb_friction", "asymmetric_friction"):
-            shape = (("presliding", float(effect.presliding)),)
-            yield Candidate(name, location, ("torque",), shape, ("presliding",))
+            shape = _bristle(effect)
+            yield Candidate(name, location, ("torque",), shape, tuple(dict(shape)))
         else:
             yield Candidate(name, location, (next(iter(effect.units)),))
+
+
+def _bristle(effect: AbstractEffect) -> tuple[tuple[str, float], ...]:
+    return ("presliding", float(effect.presliding)), ("bristle_damping", BRISTLE_DAMPING)
 
 
 class Motion:

@@ -23,11 +23,12 @@ from .locate import LatentForce, regimes
 from .loose_joint import is_of_loose_joint
 from .next_experiment import advice
 from .outcome import Outcome
-from .parameters import Parameters
+from .parameters import BRISTLE, Parameters
 from .result import Comparison, Diagnosis, Estimate, Gap, NamedEffect, Place
 from .shooting import Problem
 from .study import Study
 
+RIGID = 0.25  # of what a bristle is begun with: up to there it is as good as none
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
 
@@ -123,10 +124,10 @@ def _named(
     parameters = search.parameters
     bends = bends_before_it_slides(parameters, hypothesis.fit.vector, effect)
     for name in (*effect.amplitudes, *effect.free):
-        if name != "presliding" or bends:
+        if name not in BRISTLE or bends:
             found[name] = estimates[parameters.position(*effect.key, name)]
     for name, value in effect.shape:
-        if name not in found and name != "presliding":
+        if name not in found and name not in BRISTLE:
             found[name] = Estimate(float(value), 0.0, EFFECTS[effect.effect].units[name])
     worth = float(gain) if np.isfinite(gain) else float(hypothesis.fit.count)
     return NamedEffect(effect.effect, effect.location, found, worth, EFFECTS[effect.effect].looks_like)
@@ -164,11 +165,11 @@ def _next(verdict: str, search: Search, outcome: Outcome, forces: list[LatentFor
 
 
 def bends_before_it_slides(parameters: Parameters, vector: np.ndarray, effect: Candidate) -> bool:
-    """True of a dry friction with a bristle longer than what it was begun with, which is as good as none."""
+    """True of a dry friction with a bristle too long to be as good as none."""
     if "presliding" not in effect.free:
         return False
     place = parameters.position(*effect.key, "presliding")
-    return bool(vector[place] > parameters.start[place])
+    return bool(vector[place] > RIGID * parameters.start[place])
 
 
 def _improved(study: Study, vector: np.ndarray) -> Arm:
@@ -180,7 +181,11 @@ def _improved(study: Study, vector: np.ndarray) -> Arm:
         kind = EFFECTS[effect.effect]
         values = {field: float(vector[parameters.position(*effect.key, field)]) for field in kind.units}
         if "presliding" in values and not bends_before_it_slides(parameters, vector, effect):
-            values |= {"presliding": None, "transition_rate": values["transition_rate"] * RIGID_SIGN / SIGN}
+            values |= {
+                "presliding": None,
+                "bristle_damping": 0.0,
+                "transition_rate": values["transition_rate"] * RIGID_SIGN / SIGN,
+            }
         kept.append(kind(location=effect.location, **values))
     joints = []
     for own, given in zip(arm.joints, nominal.joints, strict=True):

@@ -41,15 +41,16 @@ class Stepping(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Dry friction of a joint, `-T(v, z) z` [N m]: its effects as one bristle z.
+    """Dry friction of a joint, `-T(v, z) (z + d z')` [N m]: its effects as one bristle z.
 
-    `width` [rad/s] of the change of its sign, and the `presliding` [rad] of the bristle, are the means
-    of theirs, by size.
+    `width` [rad/s] of the change of its sign, and the bristle's `presliding` [rad] and `damping` d [s],
+    are the means of theirs, by size.
     """
 
     effects: tuple[AbstractDryFriction, ...]
     width: Scalar
     presliding: Scalar
+    damping: Scalar
 
     def resistance(self, rate: Scalar, bend: Scalar) -> Scalar:
         """T [N m]."""
@@ -62,10 +63,29 @@ def law(model: AssembledArm, joint: int) -> Law:
     zero = jnp.zeros(())
     sizes = [jnp.abs(e.resistance(zero, 1.0)) + TINY for e in own]
     whole = sum(sizes, zero + TINY)
-    width = sum((s * e.transition_rate for s, e in zip(sizes, own, strict=True)), zero) / whole
-    bends = [zero if e.presliding is None else e.presliding for e in own]
-    presliding = sum((s * b for s, b in zip(sizes, bends, strict=True)), zero) / whole
-    return Law(own, WIDTH * width + TINY, presliding)
+
+    def mean(values: list[Scalar]) -> Scalar:
+        return sum((size * value for size, value in zip(sizes, values, strict=True)), zero) / whole
+
+    width = mean([e.transition_rate for e in own])
+    presliding = mean([zero if e.presliding is None else e.presliding for e in own])
+    damping = mean([zero if e.presliding is None else e.bristle_damping for e in own])
+    return Law(own, WIDTH * width + TINY, presliding, damping)
+
+
+class Bristle(NamedTuple):
+    """What bends at a joint, times in units of a step: `width` of rates, `presliding`, `damping`."""
+
+    width: Scalar
+    presliding: Scalar
+    damping: Scalar
+
+    def grip(self, rate: Scalar, bend: Scalar) -> Scalar:
+        """`z + d z'`, of which friction is a multiple."""
+        slipping = jnp.maximum(jnp.abs(rate), self.width)
+        bends = self.presliding > 0
+        speed = (rate - slipping * bend) / jnp.where(bends, self.presliding, 1.0)
+        return bend + jnp.where(bends, self.damping * speed, 0.0)
 
 
 def span(
@@ -74,12 +94,13 @@ def span(
     push: Scalar,
     friction: Scalar,
     length: Scalar,
-    width: Scalar,
-    presliding: Scalar,
+    bristle: Bristle,
 ) -> tuple[Scalar, Scalar]:
-    """Rate and bristle after a span of `v' = push - friction z`, `s z' = v - max(|v|, width) z`."""
-    # (v - c)(s + l |v|) + f (s z + l v) = 0, c = v0 + l push, f = l friction
-    free, force = rate + length * push, length * friction
+    """Rate and bristle after a span of `v' = push - friction (z + d z')`, `s z' = v - max(|v|, width) z`."""
+    # (v - c)(s + l |v|) + f (s z + l v) = 0, f = (l + d) friction, c = v0 + l push + d friction z
+    width, presliding, damping = bristle
+    free = rate + length * push + damping * friction * bend
+    force = (length + damping) * friction
     held = presliding + length * width
     turning = (free * held - force * presliding * bend) / (held + length * force)
     side = jnp.sign(turning)
@@ -98,10 +119,9 @@ def flow(
     bend: Scalar,
     push: Scalar,
     friction: Callable[[Scalar, Scalar], Scalar],
-    width: Scalar,
-    presliding: Scalar,
+    bristle: Bristle,
 ) -> tuple[Scalar, Scalar]:
-    """Rate and bristle after a unit of time of `v' = push - T z`, `s z' = v - max(|v|, width) z`.
+    """Rate and bristle after a unit of time of `v' = push - T (z + d z')`, `s z' = v - max(|v|, width) z`.
 
     `friction` T of rate and bristle is taken at the rate halfway through each span, as its slope
     at the beginning foretells it.
@@ -110,13 +130,13 @@ def flow(
     def onward(_, carry):
         v, z, left = carry
         length = jnp.minimum(left, 1 / CUTS)
-        slope = push - friction(v, z) * z
+        slope = push - friction(v, z) * bristle.grip(v, z)
         turns = slope * v < 0
         wait = jnp.where(turns, -v / jnp.where(turns, slope, 1.0), jnp.inf)
-        length = jnp.where((jnp.abs(v) > width) & (wait < length), wait, length)
+        length = jnp.where((jnp.abs(v) > bristle.width) & (wait < length), wait, length)
         length = jnp.maximum(length, SHORTEST)
         halfway = friction(v + length / 2 * slope, z)
-        v, z = span(v, z, push, halfway, length, width, presliding)
+        v, z = span(v, z, push, halfway, length, bristle)
         return v, z, jnp.maximum(left - length, 0.0)
 
     end, bend, _ = jax.lax.fori_loop(0, SPANS, onward, (rate, bend, jnp.ones_like(rate)))
@@ -146,7 +166,8 @@ def dry_friction(
         def slowing(rate, bend, gain=gain, own=own):
             return gain * own.resistance(rate, bend)
 
-        after, then = flow(start, bend, free - start, slowing, own.width, own.presliding / step)
+        bristle = Bristle(own.width, own.presliding / step, own.damping / step)
+        after, then = flow(start, bend, free - start, slowing, bristle)
         found.append((after - free) / gain)
         bent.append(then)
     return tuple(found), tuple(bent)
@@ -154,5 +175,9 @@ def dry_friction(
 
 def friction_at(model: AssembledArm, rates: tuple, bends: tuple) -> tuple:
     """Torque [N m] of the dry friction at every joint at an instant."""
-    laws = [law(model, joint) for joint in range(len(rates))]
-    return tuple(-own.resistance(v, z) * z for own, v, z in zip(laws, rates, bends, strict=True))
+    found = []
+    for joint, (rate, bend) in enumerate(zip(rates, bends, strict=True)):
+        own = law(model, joint)
+        bristle = Bristle(own.width, own.presliding, own.damping)
+        found.append(-own.resistance(rate, bend) * bristle.grip(rate, bend))
+    return tuple(found)

@@ -8,7 +8,7 @@ import numpy as np
 from ..files.units import parameter_unit
 from ..sensors import unit
 from .adopt import without
-from .catalogue import Candidate
+from .catalogue import FORM, Candidate
 from .hypothesis import Hypothesis, Search
 from .parameters import EffectParameter
 from .result import Estimate
@@ -17,7 +17,7 @@ from .study import Study
 
 OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
 OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
-PRESLIDING_ERROR = 0.3  # the same, of how far a bristle bends: none of its laws is the true one
+FORM_ERROR = 0.3  # the same, of how friction changes its sign and fades: none of its laws is the true one
 COMPONENTS = {"along_y": "along_x", "along_x": "along_y", "sine": "cosine", "cosine": "sine"}  # of one size
 TIMING_ERRORS = {  # of a sample
     "input_delay": 0.05,  # a delayed command counts as its mean over each
@@ -56,7 +56,7 @@ def own_error(problem: Problem, vector: np.ndarray, part: EffectParameter) -> fl
     def value(field: str) -> float:
         return float(vector[setting.parameters.position(part.effect, part.location, field)])
 
-    share = PRESLIDING_ERROR if part.field == "presliding" else OWN_ERRORS.get(part.effect, OWN_ERROR)
+    share = FORM_ERROR if part.field in FORM else OWN_ERRORS.get(part.effect, OWN_ERROR)
     own = share * np.hypot(
         value(part.field), value(COMPONENTS[part.field]) if part.field in COMPONENTS else 0.0
     )

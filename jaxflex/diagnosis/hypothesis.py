@@ -11,7 +11,7 @@ import numpy as np
 from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
 from .adopt import held_by, rise, risen, with_candidate
 from .calibrate import MOST, Fit, Freedom, fit
-from .catalogue import EITHER_SIGN, Candidate, Motion, candidates, plausible
+from .catalogue import EITHER_SIGN, FORM, Candidate, Motion, candidates, plausible
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
 from .runs import Run
@@ -31,7 +31,7 @@ CHANCE = 10.0  # gain that noise alone may bring
 SECOND_ORDER = 0.1  # uncertainty of the terms quadratic in deflection, as a share of centrifugal stiffening
 RIVAL = 0.85  # of the gain of an effect: a candidate that reaches it is tried in its place
 INVISIBLE = 1e-3  # share of a response that is its own: below it, starts and parameters imitate all
-FORM = 0.01  # of what an effect explains: what another form of it would explain better
+OTHER_FORM = 0.01  # of what an effect explains: what another form of it would explain better
 KNOWN_FORM = 0.001  # the same, where physics leaves little choice of the form
 FORM_IS_KNOWN = {
     "gravity", "load_torque_bias", "payload_mass", "hub_inertia", "torque_constant", "input_delay",
@@ -40,7 +40,8 @@ FORM_IS_KNOWN = {
 BARRED = 1e20  # precision that keeps a parameter where it is
 PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal parameters could be bent to imitate
 LEAST = 0.1  # of the value that a shape is begun with
-SHARPEST = 1e-3  # the same, of the way that friction bends over
+ANY_FORM = 2.0  # of the value that the form of friction is begun with: its standard deviation
+SHARPEST = 1e-3  # the same, of the form of friction
 FARTHEST_REST = 2 * np.pi  # rad, of a cable
 ASTRAY = 2.0  # times what is left without an effect: a fit with it that leaves more has failed
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
@@ -105,7 +106,7 @@ class Ranked:
 
 def form_error(effects: tuple[Candidate, ...], explained: dict[int, float]) -> dict[int, float]:
     """Gain at each horizon that another form of these effects may bring, of the cost that they have `explained`."""
-    share = KNOWN_FORM if {effect.effect for effect in effects} <= FORM_IS_KNOWN else FORM
+    share = KNOWN_FORM if {effect.effect for effect in effects} <= FORM_IS_KNOWN else OTHER_FORM
     return {horizon: share * cost for horizon, cost in explained.items()}
 
 
@@ -137,9 +138,10 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
         for name in effect.free:
             value = dict(effect.shape)[name]
             columns.append(parameters.position(*effect.key, name))
-            precision.append(1 / (0.5 * value if value else 1.0) ** 2)
+            share = ANY_FORM if name in FORM else 0.5
+            precision.append(1 / (share * value if value else 1.0) ** 2)
             centre.append(value)
-            least = SHARPEST if name == "presliding" else LEAST
+            least = SHARPEST if name in FORM else LEAST
             lowest.append(least * value if value else -np.inf)
     far += [np.inf] * (len(columns) - count)
     return Freedom(tuple(columns), *(np.array(part) for part in (precision, centre, lowest, far)))

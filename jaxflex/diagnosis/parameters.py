@@ -23,6 +23,7 @@ from ..files.arm_file import ArmFile
 OUTSIDE = (InputDelay, AbstractSensorEffect)
 
 CONTACT = ("contact_stiffness", "contact_damping", "motor_share")
+BRISTLE = ("presliding", "bristle_damping", "transition_rate")  # how dry friction changes its sign
 DEFAULT_UNCERTAINTY = 0.05  # relative, where an arm file says nothing
 
 
@@ -102,7 +103,7 @@ class Parameters:
     def bends_bristles(self, column: int) -> bool:
         """True of a parameter by which the bristles of dry friction bend otherwise, and not only push harder."""
         first = len(self.nominal)
-        return column >= first and self.effect[column - first].field in ("presliding", "transition_rate")
+        return column >= first and self.effect[column - first].field in BRISTLE
 
     def has_dry_friction(self, vector: np.ndarray) -> bool:
         """True if some joint has friction that changes sign with the rate."""

@@ -166,7 +166,7 @@ def make_run(recording: Recording, inputs: Sequence[str], setting: Setting, begi
     padded = np.pad(reading, ((0, total - len(times)), (0, 0)), mode="edge").reshape(pieces, length, -1)
     valid = (np.arange(total) < len(times)).reshape(pieces, length)
     starts = first_starts(setting, times, reading, command)
-    return Run(times, command, padded, valid, starts, np.arange(pieces))
+    return Run(times, command, padded, valid, starts, starts.copy(), np.arange(pieces))
 
 
 def _typical_rates(arm: Arm, pieces: Sequence[Recording], dt: float) -> list[float]:

@@ -31,13 +31,17 @@ class Slopes:
 
 @dataclass
 class Run:
-    """A recording cut into pieces, those at `places` of which count, with the states that these start from."""
+    """A recording cut into pieces, those at `places` of which count, with the states that these start from.
+
+    `measured`: those states as the readings alone tell them, before anything was fitted.
+    """
 
     times: np.ndarray  # (samples,)
     command: np.ndarray  # (samples, joints), as logged
     reading: np.ndarray  # (pieces, samples, channels)
     valid: np.ndarray  # (pieces, samples)
     starts: np.ndarray  # (pieces, states)
+    measured: np.ndarray
     places: np.ndarray
     slopes: Slopes | None = None
     point: Point | None = None
@@ -58,4 +62,7 @@ class Run:
         groups = self.places[: self.pieces // together * together].reshape(-1, together)[::stride]
         places = groups.ravel() if groups.size else self.places
         at = np.searchsorted(self.places, places)
-        return Run(self.times, self.command, self.reading[at], self.valid[at], self.starts[at], places)
+        reading, valid, starts, measured = (
+            part[at] for part in (self.reading, self.valid, self.starts, self.measured)
+        )
+        return Run(self.times, self.command, reading, valid, starts, measured, places)

@@ -54,7 +54,7 @@ def _mirrored(problem: Problem, run: Run, signs: np.ndarray) -> Run:
     command, reading = of_commands * run.command, of_readings * run.reading
     rows = reading.reshape(-1, reading.shape[-1])[: len(run.times)]
     starts = first_starts(problem.setting, run.times, rows, command)
-    return Run(run.times, command, reading, run.valid, starts, run.places)
+    return Run(run.times, command, reading, run.valid, starts, starts.copy(), run.places)
 
 
 def _turned(recording: Recording, names: frozenset[str]) -> Recording:

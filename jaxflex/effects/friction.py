@@ -32,6 +32,14 @@ def smooth_size(rate: Scalar, transition_rate: Scalar) -> Scalar:
     return transition_rate * jnp.where(small, 1 + x * x / 3, safe / jnp.tanh(safe))
 
 
+def fading(x: Scalar, tail: Scalar) -> Scalar:
+    """`(1 + p x^2)^(-1/p)` with `tail` p: from 1 at rest to 0, `exp(-x^2)` for p = 0."""
+    w = tail * x * x
+    small = jnp.abs(w) < SMALL
+    safe = jnp.where(small, 1.0, w)
+    return jnp.exp(-x * x * jnp.where(small, 1 - w / 2 + w * w / 3, jnp.log1p(safe) / safe))
+
+
 class AbstractDryFriction(AbstractJointEffect):
     """Friction `-T(rate, z) z` that changes sign with the rate; z is that sign, made smooth.
 
@@ -39,10 +47,12 @@ class AbstractDryFriction(AbstractJointEffect):
     - A bristle (Dahl 1968; Canudas de Wit et al. 1995) that bends over `presliding` s [rad]:
       `z' = (rate - |rate| z) / s`, with `|rate|` smoothed such that z goes to the rigid law
       where the rate lasts. It is a state of its own, and stiff: it settles at `|rate| / s`.
+      Damped, `-T (z + d z')`: `bristle_damping` d [s] is its damping by its stiffness.
     """
 
     transition_rate: eqx.AbstractVar[Scalar]
     presliding: eqx.AbstractVar[Scalar | None]
+    bristle_damping: eqx.AbstractVar[Scalar]
 
     @abstractmethod
     def resistance(self, rate: Scalar, side: Scalar | float) -> Scalar:
@@ -64,24 +74,34 @@ class AbstractDryFriction(AbstractJointEffect):
         return rate / self.presliding - self.settling(rate) * memory
 
     def __call__(self, angle: Scalar, rate: Scalar, time: Scalar, memory: PyTree = None) -> Scalar:
-        """`-T(rate, z) z` [N m], z the memory or, without, the smooth sign of the rate."""
-        side = smooth_sign(rate, self.transition_rate) if memory is None else memory
-        return -self.resistance(rate, side) * side
+        """`-T(rate, z) (z + d z')` [N m], z the memory or, without, the smooth sign of the rate."""
+        if memory is None:
+            side = smooth_sign(rate, self.transition_rate)
+            return -self.resistance(rate, side) * side
+        grip = memory + self.bristle_damping * self.memory_rate(rate, memory)
+        return -self.resistance(rate, memory) * grip
 
 
 class CoulombFriction(AbstractDryFriction):
     """Dry friction `-T_c sign(rate)`: `torque` T_c [N m].
 
-    `transition_rate` [rad/s] and `presliding` [rad] say how its sign changes, see `AbstractDryFriction`.
+    `transition_rate` [rad/s], `presliding` [rad] and `bristle_damping` [s] say how its sign changes, see
+    `AbstractDryFriction`.
     """
 
     torque: Scalar = eqx.field(converter=scalar)
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     presliding: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    bristle_damping: Scalar = eqx.field(converter=scalar, default=0.0)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "coulomb_friction"
     place: ClassVar[str] = "joint"
-    units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s", "presliding": "rad"}
+    units: ClassVar[dict[str, str]] = {
+        "torque": "N m",
+        "transition_rate": "rad/s",
+        "presliding": "rad",
+        "bristle_damping": "s",
+    }
     looks_like: ClassVar[str] = "a torque that jumps as the joint changes direction and is flat in between"
 
     def resistance(self, rate: Scalar, side: Scalar | float) -> Scalar:
@@ -90,10 +110,12 @@ class CoulombFriction(AbstractDryFriction):
 
 
 class StribeckFriction(AbstractDryFriction):
-    """Dry friction that is higher near rest, `-(T_c + T_s exp(-(rate/v_s)^2)) sign(rate)`.
+    """Dry friction that is higher near rest, `-(T_c + T_s f(rate/v_s)) sign(rate)`.
 
     `torque` T_s [N m] is the excess of breakaway over the `level` T_c [N m] that it fades
-    to, `stribeck_rate` v_s [rad/s] where it fades; `transition_rate` and `presliding` as for `CoulombFriction`.
+    to, `stribeck_rate` v_s [rad/s] where it fades, as `f(x) = (1 + p x^2)^(-1/p)` with `tail` p [1]: 0 for
+    `exp(-x^2)` (Armstrong-Helouvry et al. 1994), 1 for `1/(1 + x^2)` (Hess and Soom 1990); the rest as for
+    `CoulombFriction`.
     """
 
     torque: Scalar = eqx.field(converter=scalar)
@@ -101,6 +123,8 @@ class StribeckFriction(AbstractDryFriction):
     stribeck_rate: Scalar = eqx.field(converter=scalar, default=0.1)
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     presliding: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    bristle_damping: Scalar = eqx.field(converter=scalar, default=0.0)
+    tail: Scalar = eqx.field(converter=scalar, default=0.0)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "stribeck_friction"
     place: ClassVar[str] = "joint"
@@ -110,29 +134,36 @@ class StribeckFriction(AbstractDryFriction):
         "stribeck_rate": "rad/s",
         "transition_rate": "rad/s",
         "presliding": "rad",
+        "bristle_damping": "s",
+        "tail": "1",
     }
     looks_like: ClassVar[str] = "a torque against motion that peaks near rest and fades with speed"
 
     def resistance(self, rate: Scalar, side: Scalar | float) -> Scalar:
-        """`T_c + T_s exp(-(rate / v_s)^2)` [N m]."""
-        return self.level + self.torque * jnp.exp(-((rate / self.stribeck_rate) ** 2))
+        """`T_c + T_s f(rate / v_s)` [N m]."""
+        return self.level + self.torque * fading(rate / self.stribeck_rate, self.tail)
 
 
 class AsymmetricFriction(AbstractDryFriction):
     """Dry friction that differs with direction: `-T_a` while turning either way, `torque` T_a [N m].
 
     Forward motion feels T_a more, backward motion T_a less than the symmetric friction
-    it is added to; at rest it vanishes, unlike a load torque. `transition_rate` and
-    `presliding` as for `CoulombFriction`.
+    it is added to; at rest it vanishes, unlike a load torque. The rest as for `CoulombFriction`.
     """
 
     torque: Scalar = eqx.field(converter=scalar)
     transition_rate: Scalar = eqx.field(converter=scalar, default=TRANSITION_RATE)
     presliding: Scalar | None = eqx.field(converter=optional_scalar, default=None)
+    bristle_damping: Scalar = eqx.field(converter=scalar, default=0.0)
     location: str = eqx.field(static=True, default="joint_1")
     name: ClassVar[str] = "asymmetric_friction"
     place: ClassVar[str] = "joint"
-    units: ClassVar[dict[str, str]] = {"torque": "N m", "transition_rate": "rad/s", "presliding": "rad"}
+    units: ClassVar[dict[str, str]] = {
+        "torque": "N m",
+        "transition_rate": "rad/s",
+        "presliding": "rad",
+        "bristle_damping": "s",
+    }
     looks_like: ClassVar[str] = "a torque of one sign while the joint turns either way, gone at rest"
 
     def resistance(self, rate: Scalar, side: Scalar | float) -> Scalar:

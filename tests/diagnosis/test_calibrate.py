@@ -3,9 +3,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxflex.diagnosis.adopt import adopt
-from jaxflex.diagnosis.calibrate import bounded
+from jaxflex.diagnosis.calibrate import begun_anew, bounded
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.plant import bristles
+from jaxflex.effects import EFFECTS
+
+FRICTION = Candidate("coulomb_friction", "joint_1", ("torque",), (("presliding", 2e-3),), ("presliding",))
 
 
 @settings(max_examples=100, deadline=None)
@@ -33,12 +36,11 @@ def test_a_bounded_step_goes_as_far_down_as_bounds_let_it(seed, count):
 def test_bristles_begin_as_the_piece_before_leaves_them(search):
     (run,), problem, parameters = search.runs, search.problem, search.parameters
     bent = bristles(parameters.arm.assemble())
-    friction = Candidate("coulomb_friction", "joint_1", ("torque",), (("presliding", 2e-3),), ("presliding",))
     begun = run.starts.copy()
     run.starts[:, bent] = 0.3
     problem.bend(run, parameters.start)
     assert (run.starts[:, bent] == 0.3).all()  # without friction nothing tells of them
-    vector = adopt(parameters, parameters.start, friction, (0.01,))
+    vector = adopt(parameters, parameters.start, FRICTION, (0.01,))
     for _ in range(3):
         problem.bend(run, vector)
     ends = problem.predict(run, vector).end
@@ -46,3 +48,21 @@ def test_bristles_begin_as_the_piece_before_leaves_them(search):
     assert (run.starts[0, bent] == 0.3).all()
     assert np.abs(run.starts[1:, bent]).max() > 0.9
     run.starts = begun
+
+
+def test_pieces_astray_under_dry_friction_begin_anew(swung):
+    """One that its start leads far off is put back; the others keep theirs; without friction none is touched."""
+    search = swung(EFFECTS["coulomb_friction"](0.01, 1e-3, 2e-3))
+    (run,), problem, parameters = search.runs, search.problem, search.parameters
+    vector = adopt(parameters, parameters.start, FRICTION, (0.01,))
+    search.settle(vector)
+    settled, left = run.starts.copy(), problem.misfit(run, problem.predict(run, vector))
+    assert not begun_anew(problem, run, vector)
+    run.starts[3, 0] += 0.2  # rad
+    astray = run.starts.copy()
+    assert not begun_anew(problem, run, parameters.start)
+    np.testing.assert_array_equal(run.starts, astray)
+    assert begun_anew(problem, run, vector)
+    here = problem.misfit(run, problem.predict(run, vector))
+    assert here[3] < 2 * left[3] + 0.1
+    np.testing.assert_array_equal(np.delete(run.starts, 3, 0), np.delete(settled, 3, 0))

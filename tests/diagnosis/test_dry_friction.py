@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import jaxflex as jf
-from jaxflex.diagnosis.dry_friction import Stepping, dry_friction, flow, span
+from jaxflex.diagnosis.dry_friction import Bristle, Stepping, dry_friction, flow, span
 from jaxflex.effects import AsymmetricFriction, CoulombFriction
 
 FRICTION, LIGHTNESS = 0.02, 500.0
@@ -21,12 +21,19 @@ FRICTION, LIGHTNESS = 0.02, 500.0
     friction=st.floats(0.0, 2.0),
     length=st.floats(1e-6, 1.0),
     width=st.floats(1e-9, 1.0),
-    presliding=st.one_of(st.just(0.0), st.floats(1e-6, 10.0)),
+    bristle=st.one_of(
+        st.just((0.0, 0.0)), st.tuples(st.floats(1e-6, 10.0), st.one_of(st.just(0.0), st.floats(1e-6, 3.0)))
+    ),
 )
-def test_a_span_solves_backward_euler(rate, bend, push, friction, length, width, presliding):
-    given = (rate, bend, push, friction, length, width, presliding)
-    end, bent = (float(x) for x in span(*(jnp.asarray(x) for x in given)))
-    assert end == pytest.approx(rate + length * (push - friction * bent), abs=1e-9)
+def test_a_span_solves_backward_euler(rate, bend, push, friction, length, width, bristle):
+    presliding, damping = bristle
+    given = (rate, bend, push, friction, length)
+    what = Bristle(*(jnp.asarray(x) for x in (width, presliding, damping)))
+    end, bent = (float(x) for x in span(*(jnp.asarray(x) for x in given), what))
+    grip = bent + damping * (bent - bend) / length
+    assert end == pytest.approx(
+        rate + length * (push - friction * grip), rel=1e-9, abs=1e-9 * (1 + damping / length)
+    )
     settling = max(abs(end), width)
     assert presliding * (bent - bend) == pytest.approx(length * (end - settling * bent), abs=1e-9)
     assert abs(bent) <= 1 + 1e-9
@@ -49,7 +56,7 @@ def test_without_a_bristle_sliding_and_sticking_are_exact(rate, push, friction):
 def slid(rate, push, friction):
     """Rate after a unit of time of a joint that slides as it begins, without a bristle."""
     start, side, push, width, none = (jnp.asarray(float(x)) for x in (rate, np.sign(rate), push, 1e-12, 0.0))
-    return float(flow(start, side, push, friction, width, none)[0])
+    return float(flow(start, side, push, friction, Bristle(width, none, none))[0])
 
 
 def test_friction_that_weakens_with_speed_is_followed_to_second_order():
@@ -118,16 +125,18 @@ def test_reversals_are_followed_to_second_order():
     assert errors[2] < 2e-3 * np.abs(swing(RIGID, torque, 0.32, 1e-3)).max()
 
 
-def test_a_bristle_is_followed_to_first_order_of_a_part_of_a_step():
+@pytest.mark.parametrize("damping", [0.0, 2e-3])
+def test_a_bristle_is_followed_to_first_order_of_a_part_of_a_step(damping):
     """Against an integrator of its own: pushed to and fro within and beyond what the bristle bends over."""
-    bend, effects = 3e-4, (CoulombFriction(FRICTION, 1e-7, presliding=3e-4),)
+    bend, effects = 3e-4, (CoulombFriction(FRICTION, 1e-7, 3e-4, damping),)
 
     def torque(t):
         return 0.03 * np.sin(60 * t) * np.sin(7 * t)
 
     def slope(t, state):
         rate, z = state
-        return [LIGHTNESS * (torque(t) - FRICTION * z), (rate - abs(rate) * z) / bend]
+        turning = (rate - abs(rate) * z) / bend
+        return [LIGHTNESS * (torque(t) - FRICTION * (z + damping * turning)), turning]
 
     times = np.arange(1, 601) / 1000
     exact = solve_ivp(slope, (0, 0.6), [0, 0], "LSODA", times, rtol=1e-9, atol=1e-11, max_step=1e-4).y[0]
@@ -140,8 +149,8 @@ def test_a_bristle_is_followed_to_first_order_of_a_part_of_a_step():
 
 
 def test_slopes_of_a_step_are_finite_differences():
-    def end(size, start, bend, presliding):
-        effects = (CoulombFriction(size, 0.05, presliding),)
+    def end(size, start, bend, presliding, damping):
+        effects = (CoulombFriction(size, 0.05, presliding, damping),)
         axis = jf.Arm((), (jf.Joint(hub_inertia=1 / LIGHTNESS),), drive="torque", effects=effects)
         stepping = Stepping(jnp.asarray(1), jnp.asarray(2), jnp.array([LIGHTNESS]))
         free = start - 0.01
@@ -151,9 +160,9 @@ def test_slopes_of_a_step_are_finite_differences():
         return free + 2e-3 * LIGHTNESS * force + bent
 
     for start in (0.3, 0.02, 0.0, -0.004):
-        point = tuple(map(jnp.asarray, (FRICTION, start, 0.4, 2e-4)))
-        for k, size in enumerate((1e-6, 1e-6, 1e-6, 1e-9)):
-            tangent = tuple(jnp.asarray(1.0 * (i == k)) for i in range(4))
+        point = tuple(map(jnp.asarray, (FRICTION, start, 0.4, 2e-4, 1e-3)))
+        for k, size in enumerate((1e-6, 1e-6, 1e-6, 1e-9, 1e-9)):
+            tangent = tuple(jnp.asarray(1.0 * (i == k)) for i in range(5))
             slope = jax.jvp(end, point, tangent)[1]
             up, down = (
                 end(*(p + s * size * t for p, t in zip(point, tangent, strict=True))) for s in (1, -1)
