@@ -30,7 +30,8 @@ from .study import Study
 
 RIGID = 0.25  # of what a bristle is begun with: up to there it is as good as none
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
-MOSTLY = 0.9  # share of the gap that named effects must explain where the floor is not reached
+MOSTLY = 0.9  # share of the gap that a named effect must explain where the floor is not reached
+TOGETHER = 0.98  # the same, of several, which may imitate what is in no catalogue
 
 
 def nominally(study: Study) -> Foretold:
@@ -103,7 +104,8 @@ def _verdict(outcome: Outcome, left: float, gone: float) -> str:
     """What was found, by what is left and the share that has gone; effects enough to imitate anything name nothing."""
     if not outcome.final.effects:
         return "nothing_missing" if left < AT_FLOOR else "unexplained"
-    if left > AT_FLOOR and (gone < MOSTLY or len(outcome.final.effects) == MOST_EFFECTS):
+    count = len(outcome.final.effects)
+    if left > AT_FLOOR and (gone < (MOSTLY if count == 1 else TOGETHER) or count == MOST_EFFECTS):
         return "unexplained"
     return "ambiguous" if outcome.rivals else "missing_effect"
 

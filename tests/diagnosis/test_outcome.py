@@ -61,3 +61,14 @@ def test_effects_enough_to_imitate_anything_explain_nothing_that_is_left():
         found.final.effects = (effect,) * count
         verdicts += [_verdict(found, 5.0, gone=0.996), _verdict(found, 1.1, gone=0.999)]
     assert verdicts == ["missing_effect", "missing_effect", "unexplained", "missing_effect"]
+
+
+def test_several_effects_must_explain_more_than_one():
+    found = outcome(fitted(5e3, 5e3, 5e3), 1e3, 5.0)
+    effect = Candidate("quadratic_drag", "joint_1", ("coefficient",))
+    verdicts = []
+    for count in (1, 3):
+        found.final.effects = (effect,) * count
+        verdicts += [_verdict(found, 5.0, gone) for gone in (0.85, 0.95, 0.99)]
+    missing, unknown = "missing_effect", "unexplained"
+    assert verdicts == [unknown, missing, missing, unknown, unknown, missing]
