@@ -80,6 +80,12 @@ def bristles(model: AssembledArm) -> slice:
     return slice(first, first + len(model.joints))
 
 
+def heats(model: AssembledArm) -> slice:
+    """Where in the state of a piece the heat of the windings is."""
+    first = bristles(model).start - len(model.joints)
+    return slice(first, first + len(model.joints))
+
+
 def twist_place(model: AssembledArm, joint: int) -> int:
     """Which coordinate is what lies between motor and link of a joint that is loose."""
     return len(model.joints) + sum(link.shapes for link in model.links[: joint + 1]) - 1

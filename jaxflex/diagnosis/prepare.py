@@ -18,7 +18,7 @@ from ..files.recording import Recording, RecordingError
 from .catalogue import template
 from .noise import noise_floors
 from .parameters import Parameters
-from .plant import bristles, hidden_loads, state_size, substeps_for
+from .plant import bristles, heats, hidden_loads, state_size, substeps_for
 from .runs import Run
 from .shooting import Problem, Setting
 
@@ -28,6 +28,7 @@ SHORTEST_PIECE = 10  # samples
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
 SMALLEST_NOISE = 2e-4  # of a channel's spread: no model is better than that
 SAMPLES = 25_000  # of one recording that are used
+COLD = 1e-3  # J: no winding's heat is known better
 UNSEEN = 1e-6  # spread of what no reading tells: it stays as it is put
 SLOW = 0.02  # of a joint's typical rate: below it, which way a bristle is bent is a guess
 CALIBRATION = 0.6  # of a recording that is divided; the rest is held out
@@ -149,8 +150,10 @@ def make_problem(
             if cut < len(piece)
         ]
     calibration, judged_by = (second, first) if held_out is HeldOut.BEGINNINGS else (first, second)
+    warmest = np.max([run.starts[:, heats(model)].max(0) for run in (*first, *second)], 0)
+    spread[heats(model)] = np.maximum(warmest, COLD)
     return Prepared(
-        Problem(setting), calibration, judged_by,
+        Problem(dataclasses.replace(setting, start_spread=spread)), calibration, judged_by,
         {name: floors[name].std for name in outputs}, tuple(dict.fromkeys(notes)),
     )  # fmt: skip
 
@@ -223,17 +226,21 @@ def first_starts(setting: Setting, times: np.ndarray, reading: np.ndarray, comma
                 q[:, place], qd[:, place] = smooth(strain, 0)[at] / shape, smooth(strain, 1)[at] / shape
         place += link.shapes
     parts = [q, qd]
-    for i in range(joints):
+    heat = np.zeros((count, joints))
+    for i, joint in enumerate(arm.joints):
+        if joint.motor is None or arm.drive != "voltage":
+            continue
+        current = found.get(f"current_{i + 1}")
+        if current is not None:
+            current = smooth(current, 0)[at]
+        else:
+            emf = float(joint.motor.back_emf_constant * joint.motor.gear_ratio) * qd[:, i]
+            current = (command[at, i] - emf) / float(joint.motor.resistance)
         if has_current_state(model, i):
-            current = found.get(f"current_{i + 1}")
-            if current is None:
-                motor = arm.joints[i].motor
-                emf = float(motor.back_emf_constant * motor.gear_ratio) * qd[:, i]
-                current = (command[at, i] - emf) / float(motor.resistance)
-            else:
-                current = smooth(current, 0)[at]
             parts.append(current[:, None])
-    parts.append(np.zeros((count, joints)))
+        power = np.asarray(joint.motor.resistance * current**2)
+        heat[1:, i] = np.cumsum(power[:-1]) * length * dt
+    parts.append(heat)
     typical = np.sqrt(np.mean(qd[:, :joints] ** 2, 0)) + 1e-300
     parts.append(np.tanh(qd[:, :joints] / (SLOW * typical)))
     parts.append(reading[at])
