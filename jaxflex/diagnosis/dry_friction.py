@@ -40,17 +40,33 @@ class Stepping(NamedTuple):
     lightness: Float[Array, " joints"]
 
 
-class Law(NamedTuple):
-    """Dry friction of a joint, `-T(v, z) (z + d z')` [N m]: its effects as one bristle z.
+class Bristle(NamedTuple):
+    """What bends as a joint turns: `width` [rad/s] of the change of sign, `presliding` s [rad], `damping` d [s]."""
 
-    `width` [rad/s] of the change of its sign, and the bristle's `presliding` [rad] and `damping` d [s],
-    are the means of theirs, by size.
-    """
-
-    effects: tuple[AbstractDryFriction, ...]
     width: Scalar
     presliding: Scalar
     damping: Scalar
+
+    def in_steps(self, step: Scalar) -> "Bristle":
+        """The same with `step` [s] as the unit of time, and rates left in rad/s."""
+        return Bristle(self.width, self.presliding / step, self.damping / step)
+
+    def grip(self, rate: Scalar, bend: Scalar) -> Scalar:
+        """`z + d z'`, of which friction is a multiple."""
+        slipping = jnp.maximum(jnp.abs(rate), self.width)
+        bends = self.presliding > 0
+        speed = (rate - slipping * bend) / jnp.where(bends, self.presliding, 1.0)
+        return bend + jnp.where(bends, self.damping * speed, 0.0)
+
+
+class Law(NamedTuple):
+    """Dry friction of a joint, `-T(v, z) (z + d z')` [N m]: its effects as one bristle z.
+
+    The `bristle` is the mean of theirs, by size.
+    """
+
+    effects: tuple[AbstractDryFriction, ...]
+    bristle: Bristle
 
     def resistance(self, rate: Scalar, bend: Scalar) -> Scalar:
         """T [N m]."""
@@ -70,22 +86,7 @@ def law(model: AssembledArm, joint: int) -> Law:
     width = mean([e.transition_rate for e in own])
     presliding = mean([zero if e.presliding is None else e.presliding for e in own])
     damping = mean([zero if e.presliding is None else e.bristle_damping for e in own])
-    return Law(own, WIDTH * width + TINY, presliding, damping)
-
-
-class Bristle(NamedTuple):
-    """What bends at a joint, times in units of a step: `width` of rates, `presliding`, `damping`."""
-
-    width: Scalar
-    presliding: Scalar
-    damping: Scalar
-
-    def grip(self, rate: Scalar, bend: Scalar) -> Scalar:
-        """`z + d z'`, of which friction is a multiple."""
-        slipping = jnp.maximum(jnp.abs(rate), self.width)
-        bends = self.presliding > 0
-        speed = (rate - slipping * bend) / jnp.where(bends, self.presliding, 1.0)
-        return bend + jnp.where(bends, self.damping * speed, 0.0)
+    return Law(own, Bristle(WIDTH * width + TINY, presliding, damping))
 
 
 def span(
@@ -166,8 +167,7 @@ def dry_friction(
         def slowing(rate, bend, gain=gain, own=own):
             return gain * own.resistance(rate, bend)
 
-        bristle = Bristle(own.width, own.presliding / step, own.damping / step)
-        after, then = flow(start, bend, free - start, slowing, bristle)
+        after, then = flow(start, bend, free - start, slowing, own.bristle.in_steps(step))
         found.append((after - free) / gain)
         bent.append(then)
     return tuple(found), tuple(bent)
@@ -175,9 +175,7 @@ def dry_friction(
 
 def friction_at(model: AssembledArm, rates: tuple, bends: tuple) -> tuple:
     """Torque [N m] of the dry friction at every joint at an instant."""
-    found = []
-    for joint, (rate, bend) in enumerate(zip(rates, bends, strict=True)):
-        own = law(model, joint)
-        bristle = Bristle(own.width, own.presliding, own.damping)
-        found.append(-own.resistance(rate, bend) * bristle.grip(rate, bend))
-    return tuple(found)
+    laws = [law(model, joint) for joint in range(len(rates))]
+    return tuple(
+        -own.resistance(v, z) * own.bristle.grip(v, z) for own, v, z in zip(laws, rates, bends, strict=True)
+    )

@@ -165,9 +165,8 @@ def confirmed_from(
     bent them to is no good place to begin.
     """
     found, found_starts = search.confirm(before, starts, item, to, without=without), search.starts()
-    if min(before.fit.level, found.closest) > CLOSE and {effect.key for effect in before.effects} & held_by(
-        item.candidate
-    ):
+    takes_over = {effect.key for effect in before.effects} & held_by(item.candidate)
+    if takes_over and min(before.fit.level, found.closest) > CLOSE:
         search.restart(starts)
         stated, stated_starts = straightened(search, before)
         other = search.confirm(stated, stated_starts, item, to, without=without)
