@@ -6,6 +6,9 @@ import tempfile
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers side by side would fight for the cores
+os.environ.setdefault(
+    "JAX_DISABLE_MOST_OPTIMIZATIONS", "1"
+)  # programs compile in half the time; most run once
 
 import jax
 import pytest
@@ -31,8 +34,13 @@ def pytest_configure(config):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def compiled_programs():
-    """Programs of one module are dropped after it: those of all would take some gigabytes a worker."""
+def compiled_programs(request):
+    """Programs of one module are dropped after it: those of all would take some gigabytes a worker.
+
+    Those of a module marked `optimised`, which run longer than they compile, are made as users get them.
+    """
+    plain = request.node.get_closest_marker("optimised") is None
+    jax.config.update("jax_disable_most_optimizations", plain)
     yield
     jax.clear_caches()
     gc.collect()

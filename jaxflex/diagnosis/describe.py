@@ -31,6 +31,7 @@ from .study import Study
 RIGID = 0.25  # of what a bristle is begun with: up to there it is as good as none
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that a named effect must explain where the floor is not reached
+BY_DIRECTION = {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_torque_bias"}
 TOGETHER = 0.98  # the same, of several, which may imitate what is in no catalogue
 
 
@@ -104,10 +105,19 @@ def _verdict(outcome: Outcome, left: float, gone: float) -> str:
     """What was found, by what is left and the share that has gone; effects enough to imitate anything name nothing."""
     if not outcome.final.effects:
         return "nothing_missing" if left < AT_FLOOR else "unexplained"
-    count = len(outcome.final.effects)
-    if left > AT_FLOOR and (gone < (MOSTLY if count == 1 else TOGETHER) or count == MOST_EFFECTS):
+    one = laws(outcome.final.effects) == 1
+    most = len(outcome.final.effects) == MOST_EFFECTS
+    if left > AT_FLOOR and (gone < (MOSTLY if one else TOGETHER) or most):
         return "unexplained"
     return "ambiguous" if outcome.rivals else "missing_effect"
+
+
+def laws(effects: tuple[Candidate, ...]) -> int:
+    """How many effects, those that one joint feels by its direction alone counted once.
+
+    Friction, its asymmetry and a constant torque are two torques, one for either direction.
+    """
+    return len({(e.location if e.effect in BY_DIRECTION else e.key) for e in effects})
 
 
 def _bent(search: Search, final: Hypothesis) -> str:

@@ -42,7 +42,7 @@ PARTS = (AbstractBodyEffect, TorqueConstant, SensorGain)  # what nominal paramet
 LEAST = 0.1  # of the value that a shape is begun with
 ANY_FORM = 2.0  # of the value that the form of friction is begun with: its standard deviation
 SHARPEST = 1e-3  # the same, of the form of friction
-FARTHEST_REST = 2 * np.pi  # rad, of a cable
+FARTHEST_REST = 5.0  # times how far its joint turns: a cable's rest, from the middle of that
 ASTRAY = 2.0  # times what is left without an effect: a fit with it that leaves more has failed
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
@@ -353,7 +353,8 @@ class Search:
         last = found.effects[-1]
         if last.effect == "cable_stiffness":
             rest = found.fit.vector[self.parameters.position(*last.key, "rest_angle")]
-            if abs(rest) > FARTHEST_REST:
+            angle = np.concatenate([run.measured[:, last.index] for run in self.runs])
+            if abs(rest - (angle.max() + angle.min()) / 2) > FARTHEST_REST * np.ptp(angle):
                 return False  # from so far it pulls as a constant torque does
         size = (found.fit.vector[self.parameters.position(*last.key, name)] for name in last.amplitudes)
         return not last.amplitudes or plausible(last, tuple(size))

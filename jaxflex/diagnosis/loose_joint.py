@@ -54,11 +54,13 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
     """For every joint a spring between motor and link or, if that leaves something, what fits best.
 
     Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
-    that `other` found, leaves far less than `other` does: else it is left out. Where nothing bends behind
-    the joint, both: starts that are free flatter a spring before a load that nothing shows.
+    that `other` found, leaves far less than `other` does over the shortest horizon where that leaves
+    something: else it is left out. Where nothing bends behind the joint, both: starts that are free flatter
+    a spring before a load that nothing shows.
     """
     found = []
-    most = max(1 + LESS * (other.level_of_some() - 1), GONE)
+    horizon, left = first_gap(other)
+    most = max(1 + LESS * (left - 1), GONE)
     soft = _springs(other)
     for joint, own in enumerate(other.file.arm.joints):
         if soft and joint not in soft:
@@ -79,7 +81,7 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
                 carried=candidate is play,
             )  # fmt: skip
             # where in its play a load is that nothing shows, only the pieces before say
-            few = study.search.thinned(1 if bends or candidate is spring else HORIZONS[-1])
+            few = study.search.thinned(horizon if bends or candidate is spring else HORIZONS[-1])
             fitted = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             tried.append((study, few, fitted))
@@ -88,7 +90,8 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         if bends:
             tried = [min(tried, key=lambda entry: entry[2].fit.cost)]
         for study, few, fitted in tried:
-            if joined(few, fitted, other).closest < most:
+            told = joined(few, fitted, other, horizon)
+            if told.horizon == horizon and told.fit.level < most:
                 found.append((study, in_full(study.search, fitted)))
     return found
 
@@ -103,7 +106,21 @@ def _springs(study: Study) -> dict[int, tuple[float, ...]]:
     }
 
 
-def joined(search: Search, loose: Hypothesis, other: Study) -> Hypothesis:
+def first_gap(study: Study) -> tuple[int, float]:
+    """The shortest horizon over which what was found leaves something, and the misfit a reading there.
+
+    Of as few pieces as other arms are first tried on.
+    """
+    found = study.outcome.final
+    for horizon in HORIZONS:
+        study.search.restart(study.outcome.final_starts)
+        level = study.search.thinned(horizon).settle(found.fit.vector, horizon).level
+        if level > GONE:
+            return horizon, level
+    return HORIZONS[0], 1.0
+
+
+def joined(search: Search, loose: Hypothesis, other: Study, horizon: int) -> Hypothesis:
     """What a loose joint comes to along with the effects that `other` found for a joint that is not."""
     final, parameters = other.outcome.final, search.parameters
     others = tuple(effect for effect in final.effects if effect.key != loose.effects[0].key)
@@ -112,7 +129,9 @@ def joined(search: Search, loose: Hypothesis, other: Study) -> Hypothesis:
         for name in (*effect.amplitudes, *(field for field, _ in effect.shape)):
             own = other.search.parameters.position(*effect.key, name)
             vector[parameters.position(*effect.key, name)] = final.fit.vector[own]
-    return search.climb((*loose.effects, *others), vector, to=1) if others else loose
+    if not others and horizon == HORIZONS[0]:
+        return loose
+    return search.climb((*loose.effects, *others), vector, to=horizon)
 
 
 def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> Hypothesis:

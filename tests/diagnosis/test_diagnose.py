@@ -24,6 +24,8 @@ from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
 from jaxflex.effects import VoltageSaturation
 
+pytestmark = pytest.mark.optimised
+
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 
 

@@ -1,6 +1,7 @@
 """Motor and link that come apart: found from sizes far from the true one, with pieces that may run away."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,13 +13,15 @@ from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.hypothesis import HORIZONS
-from jaxflex.diagnosis.loose_joint import FLANKS, best_from, loosened
+from jaxflex.diagnosis.loose_joint import FLANKS, best_from, first_gap, loosened
 from jaxflex.diagnosis.plant import hidden_loads
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.study import Study
 from jaxflex.files.arm_file import ArmFile
 
 from .test_shooting import nominal, record
+
+pytestmark = pytest.mark.optimised
 
 GAP = 0.01  # rad
 PLAY = Candidate("backlash", "joint_1", ("gap",))
@@ -88,6 +91,32 @@ def test_play_before_a_load_that_nothing_shows_is_found(axis, size):
     assert over_a_second.horizon == HORIZONS[-1] and over_a_second.fit.level < 1.1
     place = axis.search.parameters.position("backlash", "joint_1", "gap")
     np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "levels, gap",
+    [
+        ({1: 1.3, 3: 9.0, 10: 20.0}, (1, 1.3)),
+        ({1: 0.2, 3: 9.0, 10: 20.0}, (3, 9.0)),
+        ({1: 1.0, 3: 1.05, 10: 1.6}, (10, 1.6)),
+        ({1: 1.0, 3: 1.0, 10: 1.0}, (1, 1.0)),
+    ],
+)
+def test_a_joint_is_judged_over_the_shortest_horizon_that_leaves_something(levels, gap):
+    def thinned(together):
+        def settle(vector, horizon):
+            assert horizon == together  # groups of so many pieces can be followed
+            return SimpleNamespace(level=levels[horizon])
+
+        return SimpleNamespace(settle=settle)
+
+    class Told(Study):
+        def __init__(self):
+            final = SimpleNamespace(fit=SimpleNamespace(vector=None))
+            self.search = SimpleNamespace(restart=lambda starts: None, thinned=thinned)
+            self.outcome = SimpleNamespace(final=final, final_starts=[])
+
+    assert first_gap(Told()) == gap
 
 
 def test_harder_flanks_take_more_steps(study):

@@ -4,7 +4,7 @@ import numpy as np
 
 from jaxflex.diagnosis.calibrate import Fit, Freedom
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.describe import _verdict
+from jaxflex.diagnosis.describe import _verdict, laws
 from jaxflex.diagnosis.find import MOST_EFFECTS
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
 from jaxflex.diagnosis.normal import Normal
@@ -65,10 +65,24 @@ def test_effects_enough_to_imitate_anything_explain_nothing_that_is_left():
 
 def test_several_effects_must_explain_more_than_one():
     found = outcome(fitted(5e3, 5e3, 5e3), 1e3, 5.0)
-    effect = Candidate("quadratic_drag", "joint_1", ("coefficient",))
+    effects = tuple(
+        Candidate(name, "joint_1", (name,)) for name in ("quadratic_drag", "cogging_torque", "gravity")
+    )
     verdicts = []
     for count in (1, 3):
-        found.final.effects = (effect,) * count
+        found.final.effects = effects[:count]
         verdicts += [_verdict(found, 5.0, gone) for gone in (0.85, 0.95, 0.99)]
     missing, unknown = "missing_effect", "unexplained"
     assert verdicts == [unknown, missing, missing, unknown, unknown, missing]
+
+
+def test_what_a_joint_feels_by_its_direction_alone_is_one_law():
+    def at(joint, *names):
+        return tuple(Candidate(name, f"joint_{joint}", ("torque",)) for name in names)
+
+    assert laws(at(1, "coulomb_friction", "asymmetric_friction", "load_torque_bias")) == 1
+    assert laws(at(1, "coulomb_friction") + at(2, "load_torque_bias")) == 2
+    assert laws(at(1, "coulomb_friction", "cogging_torque")) == 2
+    found = outcome(fitted(5e3, 5e3, 5e3), 1e3, 5.0)
+    found.final.effects = at(1, "coulomb_friction", "load_torque_bias")
+    assert [_verdict(found, 5.0, gone) for gone in (0.85, 0.95)] == ["unexplained", "missing_effect"]

@@ -9,6 +9,8 @@ import jaxflex as jf
 from experiments.blind.make import make_cases, write_case
 from jaxflex.diagnosis.signs import righted
 
+pytestmark = pytest.mark.optimised
+
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
