@@ -10,6 +10,8 @@ import pytest
 import jaxflex as jf
 from controllers import PD, Move
 
+pytestmark = pytest.mark.optimised
+
 ROOT = Path(__file__).resolve().parents[1]
 
 

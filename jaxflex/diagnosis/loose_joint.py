@@ -34,6 +34,7 @@ COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
 # rad; before a load that nothing shows a fit finds its way from half, and from twice
 HIDDEN_GAPS = (0.002, 0.004, 0.008, 0.016, 0.032)
+NEARLY = 0.05  # of the misfit beyond the noise: what the contact tried first may leave, that the other is not
 GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
 LESS = 0.5  # of the misfit over the shortest horizon beyond the noise: what a loose joint may leave
 TURNS = 3  # of trying the other flank and fitting again
@@ -51,12 +52,12 @@ def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]])
 
 
 def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[Study, Hypothesis]]:
-    """For every joint a spring between motor and link or, if that leaves something, what fits best.
+    """For every joint play between motor and link or, if that leaves something, a spring where it fits better.
 
-    Over the shortest horizon. A part of the pieces says which, and whether it, along with the effects
-    that `other` found, leaves far less than `other` does over the shortest horizon where that leaves
-    something: else it is left out. Where nothing bends behind the joint, both: starts that are free flatter
-    a spring before a load that nothing shows.
+    The spring first where one is known. A part of the pieces says which, and whether it, along with the
+    effects that `other` found, leaves far less than `other` does over the shortest horizon where that leaves
+    something: else it is left out. Where nothing bends behind the joint, both are gone on with: starts that
+    are free flatter a spring before a load that nothing shows.
     """
     found = []
     horizon, left = first_gap(other)
@@ -72,10 +73,11 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
         spring = Candidate("joint_flexibility", f"joint_{joint + 1}", ("compliance",))
         play = Candidate("backlash", f"joint_{joint + 1}", ("gap",))
         tried = []
-        compliances = soft.get(joint, COMPLIANCES)
-        for contact, candidate, sizes in (
-            (SPRING, spring, compliances), (FLANKS, play, GAPS if bends else HIDDEN_GAPS)
-        ):  # fmt: skip
+        ways = [
+            (FLANKS, play, GAPS if bends else HIDDEN_GAPS),
+            (SPRING, spring, soft.get(joint, COMPLIANCES)),
+        ]
+        for contact, candidate, sizes in reversed(ways) if soft else ways:
             study = Study(
                 loosened(other.file, joint, contact), recordings, other.held_out, other.search.say,
                 carried=candidate is play,
@@ -84,15 +86,13 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             few = study.search.thinned(horizon if bends or candidate is spring else HORIZONS[-1])
             fitted = best_from(few, candidate, sizes)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
-            tried.append((study, few, fitted))
-            if bends and fitted.fit.level < GONE:
+            told = joined(few, fitted, other, horizon)
+            tried.append((study, fitted, told.fit.level if told.horizon == horizon else np.inf))
+            if bends and tried[-1][2] < max(1 + NEARLY * (left - 1), GONE):
                 break
         if bends:
-            tried = [min(tried, key=lambda entry: entry[2].fit.cost)]
-        for study, few, fitted in tried:
-            told = joined(few, fitted, other, horizon)
-            if told.horizon == horizon and told.fit.level < most:
-                found.append((study, in_full(study.search, fitted)))
+            tried = [min(tried, key=lambda entry: entry[2])]
+        found += [(study, in_full(study.search, fitted)) for study, fitted, level in tried if level < most]
     return found
 
 

@@ -38,6 +38,8 @@ from controllers.pareto import at_pace
 from controllers.tuning import lagrangian
 from jaxflex import margins
 
+pytestmark = pytest.mark.optimised
+
 
 @pytest.mark.parametrize(
     "bijection, value",

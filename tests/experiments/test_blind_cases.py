@@ -13,6 +13,8 @@ from experiments.blind.sizes import COARSE, hide
 from experiments.blind.typical import TYPICAL
 from jaxflex.files import arm_file, read_recording
 
+pytestmark = pytest.mark.optimised
+
 
 @pytest.mark.parametrize("plant", ["single_link", "two_link", "axis"])
 def test_every_effect(plant):
