@@ -39,7 +39,7 @@ def study():
     return Study(loosened(file, 0, FLANKS), [recording], HeldOut.ENDS, lambda line: None)
 
 
-@pytest.mark.parametrize("size", [GAP / 3, 3 * GAP])
+@pytest.mark.parametrize("size", [pytest.param(GAP / 3, marks=pytest.mark.slow), 3 * GAP])
 def test_play_is_found_from_a_third_and_from_three_times_its_size(study, size):
     found = best_from(study.search, PLAY, (size,))
     place = study.search.parameters.position("backlash", "joint_1", "gap")
