@@ -31,8 +31,8 @@ from .study import Study
 RIGID = 0.25  # of what a bristle is begun with: up to there it is as good as none
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that a named effect must explain where the floor is not reached
-BY_DIRECTION = {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_torque_bias"}
 TOGETHER = 0.98  # the same, of several, which may imitate what is in no catalogue
+BY_DIRECTION = {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_torque_bias"}
 
 
 def nominally(study: Study) -> Foretold:

@@ -107,14 +107,9 @@ def _springs(study: Study) -> dict[int, tuple[float, ...]]:
 
 
 def first_gap(study: Study) -> tuple[int, float]:
-    """The shortest horizon over which what was found leaves something, and the misfit a reading there.
-
-    Of as few pieces as other arms are first tried on.
-    """
-    found = study.outcome.final
+    """The shortest horizon over which what was found leaves something, and the misfit a reading there."""
     for horizon in HORIZONS:
-        study.search.restart(study.outcome.final_starts)
-        level = study.search.thinned(horizon).settle(found.fit.vector, horizon).level
+        level = study.level_of_some(horizon)
         if level > GONE:
             return horizon, level
     return HORIZONS[0], 1.0

@@ -39,10 +39,10 @@ class Study:
         self._foretold: tuple[Hypothesis, Foretold] | None = None
         self._everything: tuple[Hypothesis, Hypothesis] | None = None
 
-    def level_of_some(self) -> float:
-        """Misfit a reading over the shortest horizon of the few pieces that other arms are first tried on."""
+    def level_of_some(self, horizon: int = HORIZONS[0]) -> float:
+        """Misfit a reading over `horizon` of the few pieces that other arms are first tried on."""
         self.search.restart(self.outcome.final_starts)
-        return self.search.thinned().settle(self.outcome.final.fit.vector).level
+        return self.search.thinned(horizon).settle(self.outcome.final.fit.vector, horizon).level
 
     def foretold(self) -> Foretold:
         """The held-out runs, as what was found in the end predicts them."""

@@ -1,7 +1,6 @@
 """Motor and link that come apart: found from sizes far from the true one, with pieces that may run away."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -103,18 +102,12 @@ def test_play_before_a_load_that_nothing_shows_is_found(axis, size):
     ],
 )
 def test_a_joint_is_judged_over_the_shortest_horizon_that_leaves_something(levels, gap):
-    def thinned(together):
-        def settle(vector, horizon):
-            assert horizon == together  # groups of so many pieces can be followed
-            return SimpleNamespace(level=levels[horizon])
-
-        return SimpleNamespace(settle=settle)
-
     class Told(Study):
         def __init__(self):
-            final = SimpleNamespace(fit=SimpleNamespace(vector=None))
-            self.search = SimpleNamespace(restart=lambda starts: None, thinned=thinned)
-            self.outcome = SimpleNamespace(final=final, final_starts=[])
+            pass
+
+        def level_of_some(self, horizon):
+            return levels[horizon]
 
     assert first_gap(Told()) == gap
 
