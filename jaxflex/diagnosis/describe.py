@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..arm.arm import Arm
-from ..effects import EFFECTS
+from ..effects import EFFECTS, AbstractDryFriction, LoadTorqueBias
 from ..effects.base import AbstractSensorEffect
 from .adopt import without
 from .catalogue import RIGID_SIGN, SIGN, Candidate
@@ -32,7 +32,7 @@ RIGID = 0.25  # of what a bristle is begun with: up to there it is as good as no
 VISIBLE = 1.1  # misfit a reading from which there is a gap to speak of
 MOSTLY = 0.9  # share of the gap that a named effect must explain where the floor is not reached
 TOGETHER = 0.98  # the same, of several, which may imitate what is in no catalogue
-BY_DIRECTION = {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_torque_bias"}
+BY_DIRECTION = (AbstractDryFriction, LoadTorqueBias)  # what a joint feels by the direction it turns in alone
 
 
 def nominally(study: Study) -> Foretold:
@@ -117,7 +117,7 @@ def laws(effects: tuple[Candidate, ...]) -> int:
 
     Friction, its asymmetry and a constant torque are two torques, one for either direction.
     """
-    return len({(e.location if e.effect in BY_DIRECTION else e.key) for e in effects})
+    return len({e.location if issubclass(EFFECTS[e.effect], BY_DIRECTION) else e.key for e in effects})
 
 
 def _bent(search: Search, final: Hypothesis) -> str:

@@ -34,9 +34,9 @@ COMPLIANCES = (0.05, 0.5)  # rad/(N m), to start from
 GAPS = (0.005, 0.015, 0.045)  # rad; a fit finds its way from a third of the true one, and from three times
 # rad; before a load that nothing shows a fit finds its way from half, and from twice
 HIDDEN_GAPS = (0.002, 0.004, 0.008, 0.016, 0.032)
-NEARLY = 0.05  # of the misfit beyond the noise: what the contact tried first may leave, that the other is not
-GONE = 1.1  # misfit a reading over the shortest horizon, in units of the noise, that leaves nothing
-LESS = 0.5  # of the misfit over the shortest horizon beyond the noise: what a loose joint may leave
+GONE = 1.1  # misfit a reading, in units of the noise, that leaves nothing
+NEARLY = 0.05  # of the misfit beyond the noise: what the contact tried first may leave, that the other is not tried
+LESS = 0.5  # of the same: what a loose joint may leave to be gone on with
 TURNS = 3  # of trying the other flank and fitting again
 HELPS = 0.9  # of the cost: a turn that leaves more has not helped
 
