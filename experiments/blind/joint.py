@@ -20,13 +20,19 @@ MICRO_DAMPING = 1e-3  # s: damping of the bristle while it bends, by its stiffne
 
 
 def friction(p, angle, rate, current, bristle, time, step):
-    """Torque [N m] of everything that resists the rotor's motion, and the bristle after `step`."""
-    level = p["dry"] * (1 + p["asymmetry"] * bristle) + p["growth"] * time
+    """Torque [N m] of everything that resists the rotor's motion, and the bristle after `step`.
+
+    The torque is that halfway, where `angle`, `rate` and `current` are, the `bristle` that before the
+    step; it bends as it does exactly at a constant rate.
+    """
+    stays = jnp.exp(-step * jnp.abs(rate) / p["presliding"])
+    bend = stays * bristle + (1 - stays) * jnp.sign(rate)
+    halfway = (bristle + bend) / 2
+    level = p["dry"] * (1 + p["asymmetry"] * halfway) + p["growth"] * time
     level += p["stribeck"] / (1 + (rate / p["stribeck_rate"]) ** 2)
     level += p["patch"] / (1 + ((angle - p["patch_angle"]) / p["patch_width"]) ** 4)
     level += p["load_friction"] * jnp.abs(p["torque_constant"] * current)
-    bend = (bristle + step * rate / p["presliding"]) / (1 + step * jnp.abs(rate) / p["presliding"])
-    torque = -level * (bend + MICRO_DAMPING * (bend - bristle) / step) - p["drag"] * rate * jnp.abs(rate)
+    torque = -level * (halfway + MICRO_DAMPING * (bend - bristle) / step) - p["drag"] * rate * jnp.abs(rate)
     return torque - p["ripple"] * jnp.sin(p["ripple_order"] * angle + p["ripple_phase"]), bend
 
 

@@ -12,6 +12,7 @@ import experiments.blind
 from experiments.blind import two_link
 from experiments.blind.beam import clamped_beam
 from experiments.blind.drive import plant_arrays, record
+from experiments.blind.joint import MICRO_DAMPING
 from experiments.blind.rigs import LINK, NOISE, true_rig
 from experiments.blind.simulator import CHANNELS, SAMPLE, run
 from experiments.blind.structure import COORDINATES, STATES, structure
@@ -141,7 +142,7 @@ def energy_of_two(substeps):
     return total, 0.5 * rate[0] ** 2 * a["inertia"][0]
 
 
-@pytest.mark.parametrize("energy, loss, order", [(energy_of_one, 3e-3, 1), (energy_of_two, 1e-5, 2)])
+@pytest.mark.parametrize("energy, loss, order", [(energy_of_one, 5e-4, 1), (energy_of_two, 1e-5, 2)])
 def test_energy_is_kept(energy, loss, order):
     """Over 2 s at 20 kHz, but for `loss` of what is exchanged, which shrinks with the step."""
     losses = {}
@@ -150,6 +151,20 @@ def test_energy_is_kept(energy, loss, order):
         losses[substeps] = np.ptp(total) / np.ptp(kinetic)
     assert losses[40] < loss
     assert losses[40] < 1.3 * 0.25**order * losses[10]
+
+
+@pytest.mark.parametrize("plant", ["single_link", "two_link"])
+def test_a_joint_that_sticks_and_turns_has_converged(plant):
+    """Under dry friction with a rise and an asymmetry, 2 s at 20 kHz: of second order, and far below the noise."""
+    rig = true_rig(plant, "sticks")
+    rig.set(0, dry=0.01, asymmetry=0.2, stribeck=0.005)
+    drive = np.sin(2 * np.pi * 1.3 * np.arange(1000) * SAMPLE)[:, None, None]
+    start = np.zeros(rig.nominal.physics.STATES)
+    rough, fine, finest = (free_run(rig, start, 1000, n, drive)[0][:, :3] for n in (10, 40, 160))
+    noise = np.array([NOISE[c] for c in CHANNELS[:3]])[:, None]
+    close, closer = (np.sqrt(np.mean((a - finest) ** 2, axis=0)) / noise for a in (rough, fine))
+    assert closer.max() < 0.02
+    assert closer.max() < 1.3 / 16 * close.max()
 
 
 def test_motor_reaches_its_speed():
@@ -226,8 +241,11 @@ def stepped_cantilever(rig):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plant, modes, error", [("single_link", 4, 0.01), ("two_link", 3, 0.5)])
-def test_two_independent_models_agree(plant, modes, error):
+@pytest.mark.parametrize(
+    "plant, modes, dry, error",
+    [("single_link", 4, 0.0, 0.01), ("single_link", 4, 0.01, 0.02), ("two_link", 3, 0.0, 0.5)],
+)
+def test_two_independent_models_agree(plant, modes, dry, error):
     """The library, given the true parameters, follows the plant to `error` of the noise."""
     import jax.numpy as jnp
 
@@ -235,6 +253,7 @@ def test_two_independent_models_agree(plant, modes, error):
     import jaxflex as jf
 
     rig = true_rig(plant, "agreement")
+    rig.set(0, dry=dry)
     b, joints = rig.body, range(rig.nominal.joints)
     voltage, read, _ = record([rig], 40)
 
@@ -243,12 +262,15 @@ def test_two_independent_models_agree(plant, modes, error):
 
     motors = [jf.DCMotor(*values(("resistance", "torque_constant", "back_emf_constant", "inductance"), j))
               for j in joints]  # fmt: skip
+    friction = jf.EFFECTS["coulomb_friction"](dry, transition_rate=1e-4, presliding=rig.laws["presliding"][0],
+                                              bristle_damping=MICRO_DAMPING)  # fmt: skip
     arm = jf.Arm(
         tuple(jf.Link.from_rectangle(*values(LINK[:5], j), damping_ratio=b["damping_ratio"][j], modes=modes)
               for j in joints),
         tuple(jf.Joint(hub_inertia=b["hub_inertia"][j], viscous_friction=b["viscous_friction"][j],
                        hub_mass=b["hub_mass"][j] if j else 0.0, motor=motors[j]) for j in joints),
         jf.Payload(b["payload_mass"][0], b["payload_inertia"][0]),
+        effects=(friction,) if dry else (),
         drive="voltage",
     )  # fmt: skip
     times = jnp.arange(500) * SAMPLE
