@@ -7,12 +7,12 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
-from .estimates import drop_unseen, unseen
 from .find import HALFWAY, find, find_from
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, PROMISING, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG, Hypothesis
 from .loose_joint import is_of_loose_joint, loose_joints
+from .needed import drop_unconfirmed, drop_unseen, name_uneven_first, unseen
 from .prepare import HeldOut
 from .result import Diagnosis
 from .rivals import weigh
@@ -86,7 +86,9 @@ def diagnose(
     likely = (gauged, loosened) if _astray_in_deflection(chosen) else (loosened, gauged)
     for other_arm in likely:
         chosen = other_arm(chosen)
+    drop_unconfirmed(chosen)
     weigh(chosen.search, chosen.outcome)
+    name_uneven_first(chosen.search, chosen.outcome)
     drop_unseen(chosen)
     return describe(chosen, first, began)
 

@@ -7,13 +7,11 @@ import numpy as np
 
 from ..files.units import parameter_unit
 from ..sensors import unit
-from .adopt import without
-from .catalogue import FORM, Candidate
+from .catalogue import FORM
 from .hypothesis import Hypothesis, Search
 from .parameters import EffectParameter
 from .result import Estimate
 from .shooting import Problem
-from .study import Study
 
 OWN_ERROR = 0.03  # of an effect's size: what the form given to it may be wrong by
 OWN_ERRORS = {"stribeck_friction": 0.2, "winding_heating": 0.15}  # where many forms are in use
@@ -72,30 +70,3 @@ def _unit(text: str, location: str) -> str:
         return text
     own = unit(location)
     return own if text == "of the channel" else f"{own}/s"
-
-
-def is_seen(found: dict[int, Estimate], search: Search, effect: Candidate) -> bool:
-    """True of an effect with an amplitude larger than its standard deviation, or of which nothing is known."""
-    amplitudes = [found[search.parameters.position(*effect.key, name)] for name in effect.amplitudes]
-    known = all(np.isfinite(part.std) for part in amplitudes)
-    return not (amplitudes and known) or any(abs(part.value) > part.std for part in amplitudes)
-
-
-def unseen(study: Study) -> list[Candidate]:
-    """What was found that comes to nothing in all recordings together."""
-    final = study.everything()
-    found = estimated(study.search, final)
-    return [effect for effect in final.effects if not is_seen(found, study.search, effect)]
-
-
-def drop_unseen(study: Study) -> None:
-    """Take out of what was found the effects that come to nothing, the last first; one is kept."""
-    search, outcome = study.search, study.outcome
-    while len(outcome.final.effects) > 1 and (nothing := unseen(study)):
-        effect = nothing[-1]
-        search.say(f"{effect.effect} at {effect.location} comes to nothing in all recordings together")
-        search.restart(outcome.final_starts)
-        vector = without(search.parameters, outcome.final.fit.vector, effect)
-        place = outcome.final.effects.index(effect)
-        rest = (*outcome.final.effects[:place], *outcome.final.effects[place + 1 :])
-        outcome.drop(place, search.climb(rest, vector, to=outcome.final.horizon), search.starts())

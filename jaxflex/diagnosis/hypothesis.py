@@ -268,7 +268,8 @@ class Search:
         parameters = self.parameters
         free = freedom(parameters, effects)
         taken = {effect.key for effect in effects if effect is not instead}
-        tried = [rise(c) if taken & held_by(c) else c for c in tried if c.key not in taken]
+        tried = [c for c in tried if c.key not in taken and parameters.has_what_it_changes(c.key, taken)]
+        tried = [rise(c) if taken & held_by(c) else c for c in tried]
         motions = [Motion(self.problem, run, vector) for run in self.runs]
         columns = list(free.columns)
         own = [] if instead is None else self._own_places(columns, instead)

@@ -1,5 +1,7 @@
 """What a search came to, and what there was to explain."""
 
+import dataclasses
+
 import numpy as np
 
 from .catalogue import Candidate
@@ -29,6 +31,14 @@ class Outcome:
         self.final, self.final_starts = final, starts
         self.gains = [gain for at, gain in enumerate(self.gains) if at != place]
         self.rivals = [(at - (at > place), rival) for at, rival in self.rivals if at != place]
+
+    def put(self, place: int, first: int) -> None:
+        """The effect at `place` is told before that at `first`."""
+        order = [*range(len(self.final.effects))]
+        order.insert(first, order.pop(place))
+        self.final = dataclasses.replace(self.final, effects=tuple(self.final.effects[at] for at in order))
+        self.gains = [self.gains[at] for at in order]
+        self.rivals = [(order.index(at), rival) for at, rival in self.rivals]
 
     @property
     def explained(self) -> float:

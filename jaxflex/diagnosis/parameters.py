@@ -5,7 +5,7 @@ theirs is raised. One structure then serves every hypothesis, and is compiled on
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,14 @@ from jaxtyping import Array, Float
 
 from ..arm.arm import Arm
 from ..dynamics.lagrange import mass_matrix
-from ..effects import EFFECTS, AbstractDryFriction, AbstractEffect, AbstractSensorEffect, InputDelay
+from ..effects import (
+    EFFECTS,
+    AbstractDryFriction,
+    AbstractEffect,
+    AbstractSensorEffect,
+    AsymmetricFriction,
+    InputDelay,
+)
 from ..files.arm_file import ArmFile
 
 # what these do is done to the command and to the readings, not inside the arm
@@ -85,6 +92,7 @@ class Parameters:
         model = self.arm.assemble()
         inverse = jnp.linalg.inv(mass_matrix(model, jnp.zeros(model.size)))
         self.lightness = np.array([float(inverse[i, i]) for i in range(len(file.arm.joints))])
+        self._stated = len(file.arm.effects)
         self._always_dry = any(isinstance(effect, AbstractDryFriction) for effect in file.arm.effects)
         self.start = np.array([0.0] * len(self.nominal) + [part.value for part in self.effect])
 
@@ -111,6 +119,20 @@ class Parameters:
             value != 0
             for part, value in zip(self.effect, vector[len(self.nominal) :], strict=True)
             if issubclass(EFFECTS[part.effect], AbstractDryFriction) and part.field in ("torque", "level")
+        )
+
+    def has_what_it_changes(self, key: tuple[str, str], there: Collection[tuple[str, str]]) -> bool:
+        """False of an asymmetry of dry friction at a joint that has none, neither stated nor among effects `there`.
+
+        Both are (effect, location).
+        """
+        effect, location = key
+        if not issubclass(EFFECTS[effect], AsymmetricFriction):
+            return True
+        stated = {(own.name, own.location) for own in self.arm.effects[: self._stated]}
+        return any(
+            issubclass(EFFECTS[name], AbstractDryFriction) and where == location
+            for name, where in stated.union(there)
         )
 
     def gives_way(self, link: int) -> float:
