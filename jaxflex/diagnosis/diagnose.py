@@ -8,6 +8,7 @@ from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
 from .find import HALFWAY, find, find_from
+from .finer import finer, is_coarse
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, PROMISING, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG, Hypothesis
@@ -86,6 +87,8 @@ def diagnose(
     likely = (gauged, loosened) if _astray_in_deflection(chosen) else (loosened, gauged)
     for other_arm in likely:
         chosen = other_arm(chosen)
+    if is_coarse(chosen):
+        chosen = finer(chosen, recordings) or chosen
     drop_unconfirmed(chosen)
     weigh(chosen.search, chosen.outcome)
     name_uneven_first(chosen.search, chosen.outcome)
