@@ -2,7 +2,8 @@
 
 The linear part (`structure`) moves exactly as its matrix exponential says. All else (friction,
 contact, centrifugal and other forces) is held over a step at what it is halfway, where half a step
-under the forces at its beginning leads: an exponential midpoint rule, of second order.
+under the forces at its beginning leads: an exponential midpoint rule, of second order but for what
+changes the momentum of the bent link, which lags by half a step.
 """
 
 from collections.abc import Mapping
