@@ -9,13 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arm.arm import Arm
-from ..arm.parts import AbstractLink, Link
 from ..effects import EFFECTS, AbstractDryFriction
 from ..files.recording import Recording
 from .find import find_from, settled_at
 from .hypothesis import STRONG, Starts
 from .parameters import Parameters
+from .prepare import bends_by_fewer, with_modes
 from .study import Study
 
 MODES = 3  # a link
@@ -28,13 +27,13 @@ def is_coarse(study: Study) -> bool:
     outcome = study.outcome
     sticks = any(issubclass(EFFECTS[effect.effect], AbstractDryFriction) for effect in outcome.final.effects)
     near = SOMETHING < outcome.level < max(SOMETHING, 1 + NEARLY * (outcome.nominal_level - 1))
-    return sticks and near and any(map(_can_bend_more, study.file.arm.links))
+    return sticks and near and any(bends_by_fewer(link, MODES) for link in study.file.arm.links)
 
 
 def finer(study: Study, recordings: Sequence[Recording]) -> Study | None:
     """The same with more modes a link, searched on from what was found; None if that is no better."""
     study.search.say(f"links are given {MODES} modes")
-    file = dataclasses.replace(study.file, arm=_with_modes(study.file.arm))
+    file = dataclasses.replace(study.file, arm=with_modes(study.file.arm, MODES))
     carried = bool(study.prepared.problem.setting.hidden)
     other = Study(file, recordings, study.held_out, study.search.say, carried)
     final = study.outcome.final
@@ -50,15 +49,6 @@ def finer(study: Study, recordings: Sequence[Recording]) -> Study | None:
         f"links are given {MODES} modes: fewer leave too much inertia where friction grips",
     )
     return other
-
-
-def _can_bend_more(link: AbstractLink) -> bool:
-    return isinstance(link, Link) and link.model == "assumed_modes" and 0 < link.modes < MODES
-
-
-def _with_modes(arm: Arm) -> Arm:
-    links = (dataclasses.replace(link, modes=MODES) if _can_bend_more(link) else link for link in arm.links)
-    return dataclasses.replace(arm, links=tuple(links))
 
 
 def _widened(starts: Starts, few: Parameters, more: Parameters) -> Starts:

@@ -1,12 +1,14 @@
 """Which of the effects that were found the recordings need, and which gives a law its name."""
 
+import itertools
+
 import numpy as np
 
 from ..effects import EFFECTS, AbstractDryFriction, AsymmetricFriction
 from .adopt import amplitudes_of, without
 from .catalogue import Candidate
 from .estimates import estimated
-from .foretell import AT_FLOOR, foretell
+from .foretell import AT_FLOOR
 from .hypothesis import Hypothesis, Search, Starts, restart
 from .outcome import Outcome
 from .result import Estimate
@@ -46,14 +48,13 @@ def drop_unconfirmed(study: Study) -> None:
     That is asked where they leave a gap: of effects that come near what was searched, and foretell nothing,
     each imitates something else.
     """
-    search, outcome, prepared = study.search, study.outcome, study.prepared
+    search, outcome = study.search, study.outcome
     dropped = False
-    while len(outcome.final.effects) > 1 and (left := study.foretold().level) > AT_FLOOR:
+    while len(outcome.final.effects) > 1 and (found := study.foretold()).level > AT_FLOOR:
         last = outcome.final.effects[-1]
         rest, starts = _refitted(search, outcome, last)
-        other = foretell(prepared.problem, prepared.held_out, rest).level
-        if left - 1 < (1 - CONFIRMED) * (other - 1):
-            restart(prepared.held_out, study.foretold().starts)
+        if found.level - 1 < (1 - CONFIRMED) * (study.foretold_by(rest).level - 1):
+            restart(study.prepared.held_out, found.starts)
             break
         search.say(f"{last.effect} at {last.location} is not confirmed by what was held out")
         outcome.drop(len(rest.effects), rest, starts)
@@ -79,11 +80,9 @@ def name_uneven_first(search: Search, outcome: Outcome) -> None:
     def size(effect: Candidate) -> float:
         return max(map(abs, amplitudes_of(search.parameters, vector, effect)))
 
-    for place, effect in enumerate(effects):
-        kind = EFFECTS[effect.effect]
-        if issubclass(kind, AbstractDryFriction) and not issubclass(kind, AsymmetricFriction):
-            for later, other in enumerate(effects[place:], place):
-                uneven = issubclass(EFFECTS[other.effect], AsymmetricFriction)
-                if uneven and other.location == effect.location and size(other) > UNEVEN * size(effect):
-                    outcome.put(later, place)
-                    return
+    for (first, friction), (later, other) in itertools.combinations(enumerate(effects), 2):
+        rubs = issubclass(EFFECTS[friction.effect], AbstractDryFriction)
+        uneven = issubclass(EFFECTS[other.effect], AsymmetricFriction)
+        if rubs and uneven and other.location == friction.location and size(other) > UNEVEN * size(friction):
+            outcome.put(later, first)
+            return

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from ..arm.arm import Arm
+from ..arm.parts import AbstractLink, Link
 from ..drive import has_current_state
 from ..files.arm_file import ArmFile
 from ..files.prepare import prepare
@@ -23,6 +24,7 @@ from .runs import Run
 from .shooting import Problem, Setting
 
 OUTPUTS = ("angle", "rate", "current", "tip_deflection", "strain", "tip_acceleration")
+LEAST_MODES = 2  # of a link that bends
 PIECE = 0.1  # s: the shortest horizon
 SHORTEST_PIECE = 10  # samples
 FAST_WINDING = 0.25  # of a sample: a winding faster than this follows at once
@@ -86,6 +88,19 @@ def without_fast_windings(arm: Arm, sample_time: float) -> tuple[Arm, list[str]]
     return dataclasses.replace(arm, joints=tuple(joints)), notes
 
 
+def bends_by_fewer(link: AbstractLink, modes: int) -> bool:
+    """True of an elastic link of assumed modes that has fewer than so many."""
+    return isinstance(link, Link) and link.model == "assumed_modes" and 0 < link.modes < modes
+
+
+def with_modes(arm: Arm, modes: int) -> Arm:
+    """The arm with so many modes at least in every such link."""
+    links = (
+        dataclasses.replace(link, modes=modes) if bends_by_fewer(link, modes) else link for link in arm.links
+    )
+    return dataclasses.replace(arm, links=tuple(links))
+
+
 def make_problem(
     file: ArmFile,
     recordings: Sequence[Recording],
@@ -111,13 +126,9 @@ def make_problem(
     notes = [note for piece in pieces for note in piece.repairs]
     arm, more = without_fast_windings(file.arm, step)
     notes += more
-    simple = [i for i, link in enumerate(arm.links) if link.modes == 1 and link.model == "assumed_modes"]
-    if simple:
+    if any(bends_by_fewer(link, LEAST_MODES) for link in arm.links):
         # what one mode leaves out would be taken for something missing
-        links = tuple(
-            dataclasses.replace(link, modes=2) if i in simple else link for i, link in enumerate(arm.links)
-        )
-        arm = dataclasses.replace(arm, links=links)
+        arm = with_modes(arm, LEAST_MODES)
         notes.append("links with one mode are given a second one")
     file = dataclasses.replace(file, arm=arm)
     floors = noise_floors(pieces, inputs, outputs)

@@ -36,7 +36,7 @@ class Study:
         self.prepared = make_problem(file, recordings, held_out, carried)
         self.search = Search(self.prepared.problem, self.prepared.calibration, say)
         self.notes = self.prepared.notes
-        self._foretold: tuple[Hypothesis, Foretold] | None = None
+        self._foretold: list[tuple[Hypothesis, Foretold]] = []  # the last two that were asked for
         self._everything: tuple[Hypothesis, Hypothesis] | None = None
 
     def level_of_some(self, horizon: int = HORIZONS[0]) -> float:
@@ -46,10 +46,16 @@ class Study:
 
     def foretold(self) -> Foretold:
         """The held-out runs, as what was found in the end predicts them."""
-        final = self.outcome.final
-        if self._foretold is None or self._foretold[0] is not final:
-            self._foretold = final, foretell(self.prepared.problem, self.prepared.held_out, final)
-        return self._foretold[1]
+        return self.foretold_by(self.outcome.final)
+
+    def foretold_by(self, hypothesis: Hypothesis) -> Foretold:
+        """The held-out runs, as a hypothesis predicts them."""
+        for known, found in self._foretold:
+            if known is hypothesis:
+                return found
+        found = foretell(self.prepared.problem, self.prepared.held_out, hypothesis)
+        self._foretold = [*self._foretold[-1:], (hypothesis, found)]
+        return found
 
     def everything(self) -> Hypothesis:
         """The final hypothesis fitted to all runs, held-out ones too, for the best parameters."""
