@@ -1,12 +1,8 @@
 """The search: effects are added one at a time until nothing in the catalogue stands out."""
 
-import dataclasses
-
 import numpy as np
 
 from ..effects import EFFECTS
-from .adopt import amplitudes_of, held_by, with_candidate
-from .catalogue import Candidate
 from .departure import is_suspect, straightens
 from .hypothesis import (
     CLOSE,
@@ -24,23 +20,19 @@ from .hypothesis import (
 from .outcome import Outcome
 from .rivals import prune
 from .sift import NEAR, SHORT_LIST, sift
+from .trial import Confirmed, Trial, adopted, followed, nearly_as_good, settled_at, straightened
 
 MOST_EFFECTS = 5
 FURTHER = HORIZONS[1]  # over which parts of the arm are told apart, where the motion is followed so long
 PAIR = 2  # of the short list that are tried two at a time
-SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
-HALF = 0.3  # of a larger one that an effect has to explain
-LEAD = 0.01  # of the gain: what a hypothesis with more parameters must be better by
 FAR = 10.0  # misfit a reading that bends all parameters, whatever is missing
 HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be right about
-
-Confirmed = tuple[float, Hypothesis, Starts]  # strength, hypothesis, and where its pieces start
 
 
 def find(search: Search) -> Outcome:
     """Add effects one at a time until nothing in the catalogue stands out."""
     base, starts = settled_at(search, (), search.parameters.start)
-    nominal = calibrated(search, base, starts)
+    nominal = calibrated(search, base, starts, base.fit.vector)
     outcome = Outcome(*nominal, search.over_a_second(nominal[0]))
     return _added_to(search, outcome, base, starts)
 
@@ -53,22 +45,23 @@ def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
     """
     outcome = Outcome(other.nominal, other.nominal_starts, other.nominal_level)
     starts = search.starts()
-    _advance(search, outcome, first, starts)
+    _advance(search, outcome, first, starts, first.fit.vector)
     return _added_to(search, outcome, first, starts, parts=False)
 
 
-def calibrated(search: Search, base: Hypothesis, starts: Starts) -> tuple[Hypothesis, Starts]:
-    """The hypothesis fitted over as long as it follows, and where its pieces start."""
-    search.restart(starts)
-    fitted = search.climb(base.effects, base.fit.vector, ceiling=CLOSE)
-    count, level = len(base.effects), fitted.fit.level
+def calibrated(
+    search: Search, base: Hypothesis, starts: Starts, vector: np.ndarray
+) -> tuple[Hypothesis, Starts]:
+    """As for `followed`, which the search tells."""
+    found, found_starts = followed(search, base, starts, vector)
+    count, level = len(base.effects), found.fit.level
     search.say(f"calibrated with {count} effect(s): misfit {level:.3g} of the noise floor")
-    return fitted, search.starts()
+    return found, found_starts
 
 
-def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts) -> None:
+def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, vector: np.ndarray) -> None:
     outcome.passed[outcome.final.effects] = outcome.final, outcome.final_starts
-    outcome.final, outcome.final_starts = calibrated(search, base, starts)
+    outcome.final, outcome.final_starts = calibrated(search, base, starts, vector)
     outcome.level = search.over_a_second(outcome.final)
 
 
@@ -80,19 +73,23 @@ def _added_to(
         found = next_effect(search, outcome, base, starts, parts)
         if found is None:
             break
-        base, starts = found
-        _advance(search, outcome, base, starts)
+        base, starts, vector = found
+        _advance(search, outcome, base, starts, vector)
     search.restart(outcome.final_starts)
+    before = outcome.final
     prune(search, outcome)
+    if outcome.final is not before:
+        outcome.level = search.over_a_second(outcome.final)
     return outcome
 
 
 def next_effect(
     search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool
-) -> tuple[Hypothesis, Starts] | None:
+) -> tuple[Hypothesis, Starts, np.ndarray] | None:
     """What to add to the outcome's final hypothesis, which began at `base`; None if nothing stands out.
 
-    `parts`: whether changes of the arm's parts are tried where its parameters went too far.
+    A hypothesis to go on from, where its pieces start, and the parameters as fitted. `parts`: whether
+    changes of the arm's parts are tried where its parameters went too far.
     """
     fitted, starts, explained = outcome.final, outcome.final_starts, outcome.explained_over()
     suspect = parts and is_suspect(search.parameters, fitted, outcome.explained)
@@ -111,81 +108,37 @@ def next_effect(
         form = form_error(fitted.effects, explained)
         ranked = [item for item in ranked if item.gain > form[item.horizon]]
     tried = _short_list(ranked)
-    before, before_starts = (base, base_starts) if far else (fitted, starts)
-    confirmed: list[Confirmed] = []
-
-    def confirm(items: list[Ranked], before: Hypothesis, before_starts: Starts) -> None:
-        for item in items:
-            found, found_starts = confirmed_from(
-                search, before, before_starts, item, fitted.horizon, without=fitted
-            )
-            search.say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
-            if search.sensible(found):
-                confirmed.append((found.strength(fitted, explained), found, found_starts))
-
-    confirm(tried, before, before_starts)
-    if far and not any(strength > STRONG and _worth_it(fitted, found) for strength, found, _ in confirmed):
+    trial = Trial(search, fitted, starts, explained, by_some=far)
+    if far:
+        trial.confirm(tried, base, base_starts)
+    else:
+        trial.confirm(tried, fitted, starts)
+    if far and not any(entry.strength > STRONG for entry in trial.worthy):
         # parameters bent by two effects may leave less than either of them does alone
         for item in tried[:PAIR]:
             first, first_starts = adopted(search, base, base_starts, item)
             more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
-            confirm(_short_list(more)[:PAIR], first, first_starts)
-    chosen = simplest(search, confirmed) if suspect and confirmed else None
-    if suspect and not (chosen and decisive(search, fitted, chosen[1])):
+            trial.confirm(_short_list(more)[:PAIR], first, first_starts)
+    all_explained = trial.share * outcome.explained
+    chosen = trial.simplest(trial.confirmed) if suspect and trial.confirmed else None
+    if suspect and not (chosen and decisive(search, trial.fitted, chosen.found)):
         changes = search.parts(base.effects)
-        if chosen and is_enough(search, chosen[1], outcome.explained):
-            changes = imitating(search, chosen, changes)
+        if chosen and is_enough(search, chosen.found, all_explained):
+            changes = imitating(trial.search, chosen, changes)
         if changes:
             search.restart(base_starts)
             stated, stated_starts = straightened(search, base)
             likely = sift(search, stated, stated_starts, changes, min(fitted.horizon, FURTHER))
-            confirm(likely, stated, stated_starts)
-    confirmed = [entry for entry in confirmed if _worth_it(fitted, entry[1])]
-    if not confirmed:
+            trial.confirm(likely, stated, stated_starts)
+    if not trial.worthy:
         return None
-    strength, best, best_starts = simplest(search, confirmed)
-    straight = suspect and straightens(search.parameters, fitted, best, outcome.explained)
-    if not (strength > STRONG or straight):
+    chosen = trial.simplest(trial.worthy)
+    best = chosen.found
+    straight = suspect and straightens(search.parameters, trial.fitted, best, all_explained)
+    if not (chosen.strength > STRONG or straight):
         return None
-    outcome.close[best.effects[-1].key] = nearly_as_good(search, fitted, best, confirmed)
-    return best, best_starts
-
-
-def confirmed_from(
-    search: Search,
-    before: Hypothesis,
-    starts: Starts,
-    item: Ranked,
-    to: int,
-    without: Hypothesis | None = None,
-) -> tuple[Hypothesis, Starts]:
-    """The candidate added to `before` in full, and where its pieces start; `without` as for `climb`.
-
-    One that takes the place of another is fitted from the stated parameters as well: what the other
-    bent them to is no good place to begin.
-    """
-    found, found_starts = search.confirm(before, starts, item, to, without=without), search.starts()
-    takes_over = {effect.key for effect in before.effects} & held_by(item.candidate)
-    if takes_over and min(before.fit.level, found.closest) > CLOSE:
-        search.restart(starts)
-        stated, stated_starts = straightened(search, before)
-        other = search.confirm(stated, stated_starts, item, to, without=without)
-        if other.strength(found) > 0:
-            return other, search.starts()
-    return found, found_starts
-
-
-def nearly_as_good(
-    search: Search, before: Hypothesis, best: Hypothesis, confirmed: list[Confirmed]
-) -> list[Ranked]:
-    """What else was added to `before` and explained as much as `best` does, to within what chance may bring."""
-    found: dict[tuple[str, str], Ranked] = {}
-    for strength, other, _ in confirmed:
-        candidate = other.effects[-1]
-        if candidate.key != best.effects[-1].key and best.strength(other) < 1.0:
-            step = amplitudes_of(search.parameters, other.fit.vector, candidate)
-            found[candidate.key] = Ranked(candidate, step, other.gain(before), strength)
-    return sorted(found.values(), key=lambda item: -item.strength)
+    outcome.close[best.effects[-1].key] = nearly_as_good(search, trial.fitted, best, trial.worthy)
+    return *trial.base(chosen), best.fit.vector
 
 
 def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:
@@ -210,10 +163,11 @@ def imitating(search: Search, confirmed: Confirmed, parts: list[Ranked]) -> list
 
     Where that effect is enough, parameters are bent so little that a test to first order says so.
     """
-    _, found, starts = confirmed
-    search.restart(starts)
+    found = confirmed.found
+    search.restart(confirmed.starts)
     own = found.effects[-1]
-    ranked = search.rank(found.fit.vector, found.effects, (found.horizon,), instead=own)
+    tried = [own, *dict.fromkeys(part.candidate for part in parts if part.candidate.key != own.key)]
+    ranked = search.scored(found.fit.vector, found.effects, tried, (found.horizon,), instead=own)
     gains = {item.candidate.key: item.gain for item in ranked}
     least = NEAR * gains.get(own.key, 0.0)
     return [
@@ -221,79 +175,6 @@ def imitating(search: Search, confirmed: Confirmed, parts: list[Ranked]) -> list
         for part in parts
         if part.candidate.key != own.key and gains.get(part.candidate.key, 0.0) >= least
     ]
-
-
-def adopted(search: Search, base: Hypothesis, starts: Starts, item: Ranked) -> tuple[Hypothesis, Starts]:
-    """`base` with the candidate as it was ranked, the starts settled and no parameter moved."""
-    search.restart(starts)
-    return settled_at(
-        search, *with_candidate(search.parameters, base.effects, base.fit.vector, item.candidate, item.step)
-    )
-
-
-def settled_at(
-    search: Search, effects: tuple[Candidate, ...], vector: np.ndarray
-) -> tuple[Hypothesis, Starts]:
-    """These effects and parameters as they are, the starts alone settled."""
-    settled = search.settle(vector)
-    return Hypothesis(effects, settled, 1, {1: settled.cost}), search.starts()
-
-
-def straightened(search: Search, base: Hypothesis) -> tuple[Hypothesis, Starts]:
-    """The hypothesis with the nominal parameters where they were stated, the starts settled."""
-    vector = base.fit.vector.copy()
-    vector[: len(search.parameters.nominal)] = 0.0
-    return settled_at(search, base.effects, vector)
-
-
-def _worth_it(before: Hypothesis, after: Hypothesis) -> bool:
-    """False for an effect that leaves most of a misfit that is clearly there."""
-    horizon = max(before.costs.keys() & after.costs.keys())
-    count = before.fit.count
-    left, gone = before.costs[horizon] / count - 1, (before.costs[horizon] - after.costs[horizon]) / count
-    return left < SMALL or gone > HALF * left
-
-
-def simplest(search: Search, confirmed: list[Confirmed]) -> Confirmed:
-    """Of the hypotheses that explain practically the same, the one with the fewest parameters.
-
-    Of as many parameters the one that beats the other at the horizon where they differ most. Unless
-    one of the others follows clearly better for longer than they were fitted.
-    """
-    most = max(strength for strength, _, _ in confirmed)
-    tied = [entry for entry in confirmed if entry[0] >= most - LEAD * abs(most)]
-    tied.sort(key=lambda entry: (entry[1].effects[-1].count, -entry[0]))
-
-    def followed(entry: Confirmed) -> Hypothesis:
-        search.restart(entry[2])
-        return search.climb(entry[1].effects, entry[1].fit.vector, ceiling=CLOSE)
-
-    chosen = tied[0]
-    for entry in confirmed:
-        if entry[1] is chosen[1] or entry[1].effects[-1].count != chosen[1].effects[-1].count:
-            continue
-        first, second = chosen, entry
-        if min(second[1].strength(first[1]), first[1].strength(second[1])) > 0:
-            first, second = _settled(search, first), _settled(search, second)
-        chosen = second if second[1].strength(first[1]) > first[1].strength(second[1]) else first
-    further = followed(chosen) if len(tied) > 1 and chosen[1].horizon < HORIZONS[-1] else None
-    if further is not None and further.fit.level > FAIR:
-        for entry in tied:
-            if entry is chosen:
-                continue
-            other = followed(entry)
-            if other.strength(further) > STRONG and _worth_it(further, other):
-                chosen, further = entry, other
-    return chosen
-
-
-def _settled(search: Search, confirmed: Confirmed) -> Confirmed:
-    """The same with what its parameters, better by what longer horizons taught them, leave over the shortest."""
-    strength, found, starts = confirmed
-    search.restart(starts)
-    again = search.climb(found.effects, found.fit.vector, to=HORIZONS[0])
-    short = min(again.costs[HORIZONS[0]], found.costs[HORIZONS[0]])
-    return strength, dataclasses.replace(found, costs=found.costs | {HORIZONS[0]: short}), starts
 
 
 def _merge(first: list[Ranked], second: list[Ranked]) -> list[Ranked]:

@@ -11,14 +11,16 @@ import numpy as np
 
 from ..effects import EFFECTS, AbstractDryFriction
 from ..files.recording import Recording
-from .find import find_from, settled_at
+from .find import find_from
 from .hypothesis import STRONG, Starts
 from .parameters import Parameters
 from .prepare import bends_by_fewer, with_modes
 from .study import Study
+from .trial import settled_at
 
 MODES = 3  # a link
 SOMETHING = 1.1  # misfit a reading over the longest horizon that more modes could better
+LOST = 100.0  # times the misfit over the shortest horizon: more modes than the parameters, as found, can have
 NEARLY = 0.02  # of the misfit beyond the noise without any effect: what they could not make up for
 
 
@@ -41,6 +43,8 @@ def finer(study: Study, recordings: Sequence[Recording]) -> Study | None:
         _widened(study.outcome.final_starts, study.search.parameters, other.search.parameters)
     )
     begun, _ = settled_at(other.search, final.effects, final.fit.vector)
+    if not begun.closest < LOST * final.closest:
+        return None
     other.outcome = find_from(other.search, begun, study.outcome)
     if not other.outcome.final.strength(final) > STRONG:
         return None

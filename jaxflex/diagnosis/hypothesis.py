@@ -46,6 +46,7 @@ FARTHEST_REST = 5.0  # times how far its joint turns: a cable's rest, from the m
 ASTRAY = 2.0  # times what is left without an effect: a fit with it that leaves more has failed
 RUNAWAY = 1e3  # misfit over a longer horizon, against a shorter, at which a motion is lost
 SOME = 3  # one in so many pieces tells wrong signs, and parts of the arm, apart
+FEWEST = 20  # pieces that speak for all where much is left
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 SPRING = 0.3  # of the turn by which its link gives way: from there what ties it is begun, beside from none
 FREQUENCIES = 3  # of a periodic disturbance that are tried
@@ -62,6 +63,11 @@ class Hypothesis:
     fit: Fit
     horizon: int
     costs: dict[int, float]
+
+    @property
+    def is_fitted(self) -> bool:
+        """False where the starts alone were."""
+        return bool(self.fit.freedom.columns)
 
     @property
     def closest(self) -> float:
@@ -172,6 +178,11 @@ class Search:
         self.parameters = problem.setting.parameters
         self.say = say
 
+    @property
+    def has_to_spare(self) -> bool:
+        """True if one in SOME of the pieces tells what leaves much from what leaves little."""
+        return sum(run.pieces for run in self.runs) >= SOME * FEWEST and not self.problem.setting.hidden
+
     def thinned(self, together: int = 1) -> "Search":
         """The same search with one in SOME of the pieces, for fits over `together` of them."""
         return Search(self.problem, [run.thinned(SOME, together) for run in self.runs], self.say)
@@ -202,7 +213,7 @@ class Search:
         free = freedom(self.parameters, effects)
         found, costs = (begun.fit, dict(begun.costs)) if begun else (None, {})
         for horizon in HORIZONS:
-            if horizon > to:
+            if horizon > to or (found is not None and found.level > ceiling):
                 break
             if horizon in costs:
                 continue
@@ -218,7 +229,7 @@ class Search:
                 break
             found, vector = longer, longer.vector
             costs[horizon] = found.cost
-            if found.level > ceiling or found.cost > ASTRAY * known.get(horizon, np.inf):
+            if found.cost > ASTRAY * known.get(horizon, np.inf):
                 break
         assert found is not None
         return Hypothesis(effects, found, max(costs), costs)

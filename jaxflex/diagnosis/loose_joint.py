@@ -39,6 +39,8 @@ NEARLY = 0.05  # of the misfit beyond the noise: what the contact tried first ma
 LESS = 0.5  # of the same: what a loose joint may leave to be gone on with
 TURNS = 3  # of trying the other flank and fitting again
 HELPS = 0.9  # of the cost: a turn that leaves more has not helped
+FIRST = 6  # iterations that tell sizes apart
+PROMISING = 0.75  # of a misfit: what a loose joint, its contact as guessed, leaves of one that is its own
 
 
 def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]]) -> ArmFile:
@@ -84,7 +86,8 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             )  # fmt: skip
             # where in its play a load is that nothing shows, only the pieces before say
             few = study.search.thinned(horizon if bends or candidate is spring else HORIZONS[-1])
-            fitted = best_from(few, candidate, sizes)
+            alone = bends and not other.outcome.final.effects
+            fitted = best_from(few, candidate, sizes, PROMISING * left if alone else np.inf)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             told = joined(few, fitted, other, horizon)
             tried.append((study, fitted, told.fit.level if told.horizon == horizon else np.inf))
@@ -129,10 +132,13 @@ def joined(search: Search, loose: Hypothesis, other: Study, horizon: int) -> Hyp
     return search.climb((*loose.effects, *others), vector, to=horizon)
 
 
-def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> Hypothesis:
+def best_from(
+    search: Search, candidate: Candidate, sizes: Sequence[float], most: float = np.inf
+) -> Hypothesis:
     """The candidate fitted from the best of some sizes: with its contact as guessed, then with everything.
 
-    From the parameters as stated: a misfit that a loose joint leaves bends them.
+    From the parameters as stated: a misfit that a loose joint leaves bends them. Where the best leaves a
+    misfit above `most` with its contact as guessed, it is left at that.
     """
     stated = search.parameters.start
     search.settle(stated)
@@ -143,9 +149,11 @@ def best_from(search: Search, candidate: Candidate, sizes: Sequence[float]) -> H
         search.restart(starts)
         with_it = adopt(search.parameters, stated, candidate, (size,))
         _settle(search, candidate, with_it)
-        begun.append((fit(search.problem, search.runs, with_it, first, 1), search.starts()))
+        begun.append((fit(search.problem, search.runs, with_it, first, 1, most=FIRST), search.starts()))
     best, starts = min(begun, key=lambda entry: entry[0].cost)
     search.restart(starts)
+    if best.level > most:
+        return Hypothesis((candidate,), best, HORIZONS[0], {HORIZONS[0]: best.cost})
     return _climb(search, candidate, best.vector)
 
 

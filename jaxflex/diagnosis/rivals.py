@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from .adopt import amplitudes_of, without
+from .catalogue import Candidate
 from .departure import is_suspect, straightens
 from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search, Starts
 from .loose_joint import is_of_loose_joint
@@ -29,6 +30,9 @@ def prune(search: Search, outcome: Outcome) -> None:
         gone = bool(size) and not any(size)  # another took over all that it did
         if rest in outcome.passed and not gone:
             found, starts = outcome.passed[rest]
+        elif not gone and (lost := _lost_by_some(search, outcome, rest, vector)):
+            gains[effect.key] = lost
+            continue
         else:
             search.restart(outcome.final_starts)
             found = search.climb(rest, vector, ceiling=np.inf if gone else CLOSE, iterations=3)
@@ -43,6 +47,24 @@ def prune(search: Search, outcome: Outcome) -> None:
             gains[effect.key] = outcome.final.gain(found)
     search.restart(outcome.final_starts)
     outcome.gains = [gains.get(effect.key, np.inf) for effect in outcome.final.effects]
+
+
+def _lost_by_some(search: Search, outcome: Outcome, rest: tuple[Candidate, ...], vector: np.ndarray) -> float:
+    """What a part of the pieces shows that the final hypothesis gains on one with the effects of `rest` alone.
+
+    0 if such a one follows, or is nearly as good, or where no part of them can say.
+    """
+    if not search.has_to_spare:
+        return 0.0
+    search.restart(outcome.final_starts)
+    few = search.thinned()
+    starts = few.starts()
+    own = few.climb(outcome.final.effects, outcome.final.fit.vector, to=HORIZONS[0], most=1)
+    few.restart(starts)
+    found = few.climb(rest, vector, to=HORIZONS[0], iterations=3)
+    if found.closest < CLOSE * max(own.closest, 1.0) or own.strength(found) < STRONG:
+        return 0.0
+    return own.gain(found) * outcome.final.fit.count / own.fit.count
 
 
 def weigh(search: Search, outcome: Outcome) -> None:

@@ -9,11 +9,11 @@ import pytest
 import jaxflex as jf
 from controllers import Replayed, Step
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.find import settled_at
 from jaxflex.diagnosis.finer import MODES, _widened, finer, is_coarse
 from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.prepare import HeldOut
 from jaxflex.diagnosis.study import Study
+from jaxflex.diagnosis.trial import settled_at
 from jaxflex.effects import CoulombFriction
 
 FRICTION = Candidate("coulomb_friction", "joint_1", ("torque",))
@@ -109,3 +109,16 @@ def test_what_three_modes_made_is_followed_by_three_only():
     assert found.outcome.level < study.outcome.level
     assert {link.modes for link in found.file.arm.links} == {MODES}
     assert any(f"{MODES} modes" in note for note in found.notes)
+
+
+def test_more_modes_that_lose_the_motion_are_left(monkeypatch):
+    file, recordings = recorded(CoulombFriction(0.02, presliding=1e-3))
+    study = studied(file, recordings, (FRICTION,))
+
+    def lost(search, effects, vector):
+        found, starts = settled_at(search, effects, vector)
+        return dataclasses.replace(found, costs={1: np.inf}), starts
+
+    monkeypatch.setattr("jaxflex.diagnosis.finer.settled_at", lost)
+    monkeypatch.setattr("jaxflex.diagnosis.finer.find_from", None)
+    assert finer(study, recordings) is None

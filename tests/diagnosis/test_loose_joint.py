@@ -49,6 +49,13 @@ def test_play_is_found_from_a_third_and_from_three_times_its_size(study, size):
     np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.01)
 
 
+def test_what_play_does_not_explain_with_flanks_as_guessed_is_left_at_that(study):
+    found = best_from(study.search, PLAY, (3 * GAP,), most=0.5)
+    contact = [k for k, part in enumerate(study.search.parameters.nominal) if part.is_of_contact]
+    assert found.costs.keys() == {HORIZONS[0]} and found.fit.level > 0.5
+    assert not found.fit.vector[contact].any()
+
+
 @pytest.fixture(scope="module")
 def axis():
     """A bare axis taken apart, and what one with play showed: its motor's angle alone."""

@@ -5,10 +5,11 @@ import pytest
 
 from jaxflex.diagnosis.calibrate import Fit, Freedom
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.find import FURTHER, settled_at
+from jaxflex.diagnosis.find import FURTHER
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Ranked, Search
 from jaxflex.diagnosis.normal import Normal
 from jaxflex.diagnosis.sift import _promising, sift
+from jaxflex.diagnosis.trial import settled_at
 from jaxflex.effects import ViscousFriction
 
 SPRING = Candidate("joint_flexibility", "joint_1", ("compliance",))
