@@ -86,8 +86,11 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             )  # fmt: skip
             # where in its play a load is that nothing shows, only the pieces before say
             few = study.search.thinned(horizon if bends or candidate is spring else HORIZONS[-1])
-            alone = bends and not other.outcome.final.effects
-            fitted = best_from(few, candidate, sizes, PROMISING * left if alone else np.inf)
+            beside = bool(other.outcome.final.effects)  # which bend the parameters until they are joined
+            far = horizon == HORIZONS[0] and left > CLOSE
+            limit = PROMISING * left if bends and far and not beside else np.inf
+            turns = 0 if bends and beside else TURNS
+            fitted = best_from(few, candidate, sizes, limit, turns)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
             told = joined(few, fitted, other, horizon)
             tried.append((study, fitted, told.fit.level if told.horizon == horizon else np.inf))
@@ -133,12 +136,16 @@ def joined(search: Search, loose: Hypothesis, other: Study, horizon: int) -> Hyp
 
 
 def best_from(
-    search: Search, candidate: Candidate, sizes: Sequence[float], most: float = np.inf
+    search: Search,
+    candidate: Candidate,
+    sizes: Sequence[float],
+    most: float = np.inf,
+    turns: int = TURNS,
 ) -> Hypothesis:
     """The candidate fitted from the best of some sizes: with its contact as guessed, then with everything.
 
     From the parameters as stated: a misfit that a loose joint leaves bends them. Where the best leaves a
-    misfit above `most` with its contact as guessed, it is left at that.
+    misfit above `most` with its contact as guessed, it is left at that. `turns` as for `turned`.
     """
     stated = search.parameters.start
     search.settle(stated)
@@ -154,7 +161,7 @@ def best_from(
     search.restart(starts)
     if best.level > most:
         return Hypothesis((candidate,), best, HORIZONS[0], {HORIZONS[0]: best.cost})
-    return _climb(search, candidate, best.vector)
+    return _climb(search, candidate, best.vector, turns)
 
 
 def in_full(search: Search, fitted: Hypothesis) -> Hypothesis:
@@ -173,9 +180,9 @@ def _settle(search: Search, candidate: Candidate, vector: np.ndarray) -> None:
     search.settle(vector)
 
 
-def _climb(search: Search, candidate: Candidate, vector: np.ndarray) -> Hypothesis:
+def _climb(search: Search, candidate: Candidate, vector: np.ndarray, turns: int = TURNS) -> Hypothesis:
     fitted = search.climb((candidate,), vector, to=1, iterations=8)
-    return turned(search, fitted, candidate.index) if candidate.effect == "backlash" else fitted
+    return turned(search, fitted, candidate.index, turns) if candidate.effect == "backlash" else fitted
 
 
 def is_of_loose_joint(parameters: Parameters, effect: Candidate) -> bool:
@@ -200,9 +207,9 @@ def without_contact(parameters: Parameters, candidate: Candidate) -> Freedom:
     )
 
 
-def turned(search: Search, fitted: Hypothesis, joint: int) -> Hypothesis:
-    """Fitted again with the pieces that are lost begun at the flank that suits them, while that helps."""
-    for _ in range(TURNS):
+def turned(search: Search, fitted: Hypothesis, joint: int, turns: int = TURNS) -> Hypothesis:
+    """Fitted again with the pieces that are lost begun at the flank that suits them, `turns` times while that helps."""
+    for _ in range(turns):
         if fitted.fit.level < CLOSE:
             break
         starts = search.starts()

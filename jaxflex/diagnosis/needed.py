@@ -10,6 +10,7 @@ from .catalogue import Candidate
 from .estimates import estimated
 from .foretell import AT_FLOOR
 from .hypothesis import Hypothesis, Search, Starts, restart
+from .loose_joint import is_of_loose_joint
 from .outcome import Outcome
 from .result import Estimate
 from .rivals import prune
@@ -43,23 +44,28 @@ def drop_unseen(study: Study) -> None:
 
 
 def drop_unconfirmed(study: Study) -> None:
-    """Take out of what was found, the last first, what held-out runs do not confirm; one is kept.
+    """Take out of what was found, the last first, what held-out runs do not confirm.
 
     That is asked where they leave a gap: of effects that come near what was searched, and foretell nothing,
-    each imitates something else.
+    each imitates something else. One alone need only foretell better than none; it is kept where a joint was
+    taken apart for it.
     """
     search, outcome = study.search, study.outcome
     dropped = False
-    while len(outcome.final.effects) > 1 and (found := study.foretold()).level > AT_FLOOR:
+    while outcome.final.effects and (found := study.foretold()).level > AT_FLOOR:
         last = outcome.final.effects[-1]
+        alone = len(outcome.final.effects) == 1
+        if alone and is_of_loose_joint(search.parameters, last):
+            break
         rest, starts = _refitted(search, outcome, last)
-        if found.level - 1 < (1 - CONFIRMED) * (study.foretold_by(rest).level - 1):
+        share = 0.0 if alone else CONFIRMED
+        if found.level - 1 < (1 - share) * (study.foretold_by(rest).level - 1):
             restart(study.prepared.held_out, found.starts)
             break
         search.say(f"{last.effect} at {last.location} is not confirmed by what was held out")
         outcome.drop(len(rest.effects), rest, starts)
         dropped = True
-    if dropped:
+    if dropped and outcome.final.effects:
         prune(search, outcome)
     search.restart(outcome.final_starts)
 

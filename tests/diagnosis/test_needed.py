@@ -44,8 +44,11 @@ def test_effects_that_come_to_nothing_are_dropped_but_for_the_last(recorded):
 
 
 def test_the_last_effects_are_dropped_that_held_out_runs_do_not_confirm(recorded, monkeypatch):
-    """Of three the third leaves an eighth less there, the second most less; at the floor none is asked for more."""
-    left = {1: 50.0, 2: 10.0, 3: 9.0}
+    """Of three the third leaves a ninth less there, the second most less; at the floor none is asked for more.
+
+    One alone is kept if it foretells better than none.
+    """
+    left = {0: 60.0, 1: 50.0, 2: 10.0, 3: 9.0}
     study = Study(*recorded(QuadraticDrag(1e-3)), HeldOut.ENDS, lambda line: None)
     search, own = study.search, foretell
 
@@ -61,10 +64,14 @@ def test_the_last_effects_are_dropped_that_held_out_runs_do_not_confirm(recorded
         study.outcome.final, study.outcome.final_starts = found
         study.outcome.gains = [3.0, 2.0, 1.0]
         drop_unconfirmed(study)
-        return study.outcome.final.effects[: len(left)]
+        return study.outcome.final.effects
 
     assert DRAG in dropped()
     assert RIPPLE not in dropped()
+    left |= {2: 55.0, 3: 60.0}
+    assert dropped() == (DRAG,)
+    left |= {0: 40.0}
+    assert dropped() == () and study.outcome.gains == []
     left |= {3: 1.5}
     assert dropped() == (DRAG, OFFSET, RIPPLE)
 
