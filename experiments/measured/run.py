@@ -4,13 +4,14 @@ from pathlib import Path
 
 import jaxflex as jf
 
-from .dry import dry_torque
+from .dry import dry_torque, held_torques
 from .force import force_error, least_error
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 MACHINES = ("emps", "quanser_flexible_link")
 CORNERS = (8.0, 12.0, 20.0, 30.0)  # Hz
 SLOWEST = (0.0, 0.5)  # rad/s
+LASTING, SETTLING = 0.06, 0.03  # s
 
 
 def read(machine: str) -> tuple[jf.ArmFile, jf.Recording]:
@@ -52,6 +53,8 @@ def run(folder: Path, reduced: bool) -> dict:
                 "with what was named": force_error(found.improved, recording),
             }
         if file.arm.links:
+            held = held_torques(file.arm, recording, LASTING, SETTLING)
+            figures[machine]["torques held at rest [N m]"] = held
             figures[machine]["coulomb torque by least squares [N m]"] = {
                 f"from {slowest:g} rad/s": {
                     f"{corner:g} Hz": dry_torque(file.arm, recording, corner, slowest) for corner in CORNERS
