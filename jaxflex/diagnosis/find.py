@@ -109,10 +109,7 @@ def next_effect(
         ranked = [item for item in ranked if item.gain > form[item.horizon]]
     tried = _short_list(ranked)
     trial = Trial(search, fitted, starts, explained, by_some=far)
-    if far:
-        trial.confirm(tried, base, base_starts)
-    else:
-        trial.confirm(tried, fitted, starts)
+    trial.confirm(tried, *((base, base_starts) if far else (fitted, starts)))
     if far and not any(entry.strength > STRONG for entry in trial.worthy):
         # parameters bent by two effects may leave less than either of them does alone
         for item in tried[:PAIR]:
