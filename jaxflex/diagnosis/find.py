@@ -52,7 +52,7 @@ def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
 def calibrated(
     search: Search, base: Hypothesis, starts: Starts, vector: np.ndarray
 ) -> tuple[Hypothesis, Starts]:
-    """As for `followed`, which the search tells."""
+    """What `followed` gives, and word of it."""
     found, found_starts = followed(search, base, starts, vector)
     count, level = len(base.effects), found.fit.level
     search.say(f"calibrated with {count} effect(s): misfit {level:.3g} of the noise floor")
