@@ -112,6 +112,11 @@ def fit(
     return found
 
 
+def settle(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: int = 1) -> Fit:
+    """The starts of all pieces of these runs fitted alone, parameters held."""
+    return fit(problem, runs, vector, Freedom.full([]), horizon, 2)
+
+
 def begun_anew(problem: Problem, run: Run, vector: np.ndarray) -> bool:
     """Start pieces that went astray under dry friction from what their readings tell; true if any fits better so.
 

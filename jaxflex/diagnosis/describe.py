@@ -70,7 +70,7 @@ def describe(study: Study, first: Study, began: float) -> Diagnosis:
         alternatives=tuple(alternatives),
         where=_where(before.misfits, forces_before, outcome),
         gap=Gap(
-            "root mean square error of predictions over 1 s from estimated starts",
+            _measure(before, after),
             True, before.errors, after.errors, study.prepared.floor,
         ),
         next_experiment=_next(verdict, search, outcome, forces_after),
@@ -83,6 +83,12 @@ def describe(study: Study, first: Study, began: float) -> Diagnosis:
         forces_after=tuple(forces_after),
         comparison=_comparison(search.problem, before, after),
     )  # fmt: skip
+
+
+def _measure(before: Foretold, after: Foretold) -> str:
+    """What a gap is measured by."""
+    shorter = f" ({after.span:.2g} s after)" if after.span < before.span else ""
+    return f"root mean square error of predictions over {before.span:.2g} s{shorter} from estimated starts"
 
 
 def lacking(search: Search, outcome: Outcome) -> list[LatentForce]:

@@ -14,11 +14,11 @@ from .hypothesis import (
     Hypothesis,
     Ranked,
     Search,
-    Starts,
     form_error,
 )
 from .outcome import Outcome
 from .rivals import prune
+from .runs import Starts
 from .sift import NEAR, SHORT_LIST, sift
 from .trial import Confirmed, Trial, adopted, followed, nearly_as_good, settled_at, straightened
 
@@ -37,16 +37,17 @@ def find(search: Search) -> Outcome:
     return _added_to(search, outcome, base, starts)
 
 
-def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
+def find_from(search: Search, first: Hypothesis, other: Outcome, excused: bool = True) -> Outcome:
     """Add effects to a first one that is settled already, the pieces starting where they are.
 
     `other`: what came of the arm as it was stated. What it left without any effect is what there was
-    to explain, and what parts of the arm imitate has been seen there.
+    to explain. Parts of the arm are not tried, as they were there; without `excused`, what sets the arm's
+    parameters straight is taken although the law of `first`, which is not the true one, may have bent them.
     """
     outcome = Outcome(other.nominal, other.nominal_starts, other.nominal_level)
     starts = search.starts()
     _advance(search, outcome, first, starts, first.fit.vector)
-    return _added_to(search, outcome, first, starts, parts=False)
+    return _added_to(search, outcome, first, starts, parts=False, excused=excused)
 
 
 def calibrated(
@@ -66,11 +67,16 @@ def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts,
 
 
 def _added_to(
-    search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, parts: bool = True
+    search: Search,
+    outcome: Outcome,
+    base: Hypothesis,
+    starts: Starts,
+    parts: bool = True,
+    excused: bool = True,
 ) -> Outcome:
     """The outcome with what else stands out; its final hypothesis began at `base`."""
     while len(outcome.final.effects) < MOST_EFFECTS:
-        found = next_effect(search, outcome, base, starts, parts)
+        found = next_effect(search, outcome, base, starts, parts, excused)
         if found is None:
             break
         base, starts, vector = found
@@ -84,15 +90,17 @@ def _added_to(
 
 
 def next_effect(
-    search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool
+    search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool, excused: bool
 ) -> tuple[Hypothesis, Starts, np.ndarray] | None:
     """What to add to the outcome's final hypothesis, which began at `base`; None if nothing stands out.
 
     A hypothesis to go on from, where its pieces start, and the parameters as fitted. `parts`: whether
-    changes of the arm's parts are tried where its parameters went too far.
+    changes of the arm's parts are tried where its parameters went too far; `excused`: farther than the laws
+    of the effects found may bend them.
     """
     fitted, starts, explained = outcome.final, outcome.final_starts, outcome.explained_over()
-    suspect = parts and is_suspect(search.parameters, fitted, outcome.explained)
+    excuse = outcome.explained if excused else 0.0
+    suspect = (parts or not excused) and is_suspect(search.parameters, fitted, excuse)
     little = outcome.level - 1 < LITTLE * (outcome.nominal_level - 1)
     if fitted.effects and fitted.closest < CLOSE and little and not suspect:
         return None
@@ -116,11 +124,11 @@ def next_effect(
             first, first_starts = adopted(search, base, base_starts, item)
             more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
             trial.confirm(_short_list(more)[:PAIR], first, first_starts)
-    all_explained = trial.share * outcome.explained
+    excuse *= trial.share
     chosen = trial.simplest(trial.confirmed) if suspect and trial.confirmed else None
-    if suspect and not (chosen and decisive(search, trial.fitted, chosen.found)):
+    if parts and suspect and not (chosen and decisive(search, trial.fitted, chosen.found)):
         changes = search.parts(base.effects)
-        if chosen and is_enough(search, chosen.found, all_explained):
+        if chosen and is_enough(search, chosen.found, excuse):
             changes = imitating(trial.search, chosen, changes)
         if changes:
             search.restart(base_starts)
@@ -131,7 +139,7 @@ def next_effect(
         return None
     chosen = trial.simplest(trial.worthy)
     best = chosen.found
-    straight = suspect and straightens(search.parameters, trial.fitted, best, all_explained)
+    straight = suspect and straightens(search.parameters, trial.fitted, best, excuse)
     if not (chosen.strength > STRONG or straight):
         return None
     outcome.close[best.effects[-1].key] = nearly_as_good(search, trial.fitted, best, trial.worthy)

@@ -12,9 +12,10 @@ import numpy as np
 from ..effects import EFFECTS, AbstractDryFriction
 from ..files.recording import Recording
 from .find import find_from
-from .hypothesis import STRONG, Starts
+from .hypothesis import STRONG
 from .parameters import Parameters
 from .prepare import bends_by_fewer, with_modes
+from .runs import Starts
 from .study import Study
 from .trial import settled_at
 

@@ -9,11 +9,12 @@ import numpy as np
 
 from .calibrate import Freedom, fit
 from .chains import whitened
-from .flanks import choose_flanks
-from .hypothesis import HORIZONS, Hypothesis, Starts, starts_of
-from .runs import Run
+from .flanks import choose_flanks, join
+from .hypothesis import HORIZONS, Hypothesis
+from .runs import Run, Starts, restart, starts_of
 from .shooting import Problem
 
+LOST = 3.0  # times the misfit over a shorter horizon: a load in a play cannot be followed for so long
 AT_FLOOR = 2.0  # misfit a reading, in units of the noise, up to which nothing is left
 
 
@@ -21,13 +22,15 @@ class Foretold(NamedTuple):
     """What held-out runs were foretold as.
 
     `errors` by channel, root mean square; `misfits` a reading by channel, whitened and in units of the
-    noise, so that 1 is the noise floor; every run with its readings as predicted; `starts` as fitted.
+    noise, so that 1 is the noise floor; every run with its readings as predicted; `starts` as fitted;
+    `span` [s] over which all are predicted.
     """
 
     errors: dict[str, float]
     misfits: dict[str, float]
     predictions: list[tuple[Run, np.ndarray]]
     starts: Starts
+    span: float
 
     @property
     def level(self) -> float:
@@ -36,7 +39,10 @@ class Foretold(NamedTuple):
 
 
 def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foretold:
-    """Held-out runs as the hypothesis predicts them, the starts of their pieces alone fitted."""
+    """Held-out runs as the hypothesis predicts them, the starts of their pieces alone fitted.
+
+    Over a second, or for as long as a load that comes apart from its motor can be followed.
+    """
     setting = problem.setting
     # the phase of a disturbance is its own in every run
     free = [
@@ -47,16 +53,21 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
     ]
     held = Freedom.full(free)
     plays = [effect.index for effect in hypothesis.effects if effect.effect == "backlash"]
-    squares, misfits, predictions = [], [], []
+    squares, misfits, predictions, span = [], [], [], HORIZONS[-1]
     for run in runs:
-        vector = hypothesis.fit.vector
-        for horizon in HORIZONS:
-            if horizon > HORIZONS[0]:
-                problem.join(run, vector)
-            found = fit(problem, [run], vector, held, horizon, 4)
-            vector = found.vector
-            for joint in plays if horizon == HORIZONS[0] else ():
-                choose_flanks(problem, [run], vector, joint)
+        found = fit(problem, [run], hypothesis.fit.vector, held, HORIZONS[0], 4)
+        for joint in plays:
+            choose_flanks(problem, [run], found.vector, joint)
+        reached = HORIZONS[0]
+        for horizon in HORIZONS[1:]:
+            starts = starts_of([run])
+            join(problem, [run], found.vector, horizon)
+            longer = fit(problem, [run], found.vector, held, horizon, 4)
+            if plays and not longer.level < LOST * found.level:
+                restart([run], starts)
+                break
+            found, reached = longer, horizon
+        vector, span = found.vector, min(span, reached)
         reading = problem.predict(run, vector).reading
         lost = ~np.isfinite(reading).all((1, 2), keepdims=True)
         # a motion that cannot be followed counts as if nothing had been foretold of it
@@ -71,4 +82,5 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
         return dict(zip(setting.channels, map(float, values), strict=True))
 
     errors, levels = by_channel(np.sqrt(np.mean(squares, 0))), by_channel(np.mean(misfits, 0))
-    return Foretold(errors, levels, predictions, starts_of(runs))
+    piece = setting.length * setting.sample_time
+    return Foretold(errors, levels, predictions, starts_of(runs), span * piece)

@@ -10,13 +10,14 @@ import numpy as np
 
 from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
 from .adopt import held_by, rise, risen, with_candidate
-from .calibrate import MOST, Fit, Freedom, fit
+from .calibrate import MOST, Fit, Freedom, fit, settle
 from .catalogue import EITHER_SIGN, FORM, Candidate, Motion, candidates, plausible
+from .flanks import join
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
-from .runs import Run
+from .runs import Run, Starts, restart, starts_of
 from .screen import scores, with_candidates
-from .shooting import Problem, Slopes
+from .shooting import Problem
 
 HORIZONS = (1, 3, 10)  # pieces: a tenth of a second, a third, one second
 # A model is never the plant. What it gets wrong shows more the longer it runs, and is no
@@ -50,9 +51,6 @@ FEWEST = 20  # pieces that speak for all where much is left
 HUBS = (2.0, 8.0)  # of the inertia that a joint feels: sizes from which a hub's is begun
 SPRING = 0.3  # of the turn by which its link gives way: from there what ties it is begun, beside from none
 FREQUENCIES = 3  # of a periodic disturbance that are tried
-
-
-Starts = list[tuple[np.ndarray, Slopes | None]]
 
 
 @dataclass
@@ -153,22 +151,6 @@ def freedom(parameters: Parameters, effects: tuple[Candidate, ...]) -> Freedom:
     return Freedom(tuple(columns), *(np.array(part) for part in (precision, centre, lowest, far)))
 
 
-def starts_of(runs: list[Run]) -> Starts:
-    """The starts of all pieces of these runs, with the slopes there."""
-    return [(run.starts.copy(), run.slopes) for run in runs]
-
-
-def restart(runs: list[Run], starts: Starts) -> None:
-    """Back to what `starts_of` gave."""
-    for run, (kept, slopes) in zip(runs, starts, strict=True):
-        run.starts, run.slopes = kept.copy(), slopes
-
-
-def settle(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: int = 1) -> Fit:
-    """The starts of all pieces of these runs fitted alone, parameters held."""
-    return fit(problem, runs, vector, Freedom.full([]), horizon, 2)
-
-
 class Search:
     """Fits hypotheses to runs and ranks what each one misses."""
 
@@ -217,12 +199,11 @@ class Search:
                 break
             if horizon in costs:
                 continue
+            starts = self.starts()
             if found is not None:
-                for run in self.runs:
-                    self.problem.join(run, vector)
+                join(self.problem, self.runs, vector, horizon)
                 if self.parameters.plays:  # where a contact opens and shuts, only slopes near it hold
                     self.settle(vector, horizon)
-            starts = self.starts()
             longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)
             if found is not None and not longer.level < RUNAWAY * (1 + found.level):
                 self.restart(starts)  # the motion cannot be followed for so long

@@ -9,11 +9,12 @@ from .adopt import amplitudes_of, without
 from .catalogue import Candidate
 from .estimates import estimated
 from .foretell import AT_FLOOR
-from .hypothesis import Hypothesis, Search, Starts, restart
+from .hypothesis import Hypothesis, Search
 from .loose_joint import is_of_loose_joint
 from .outcome import Outcome
 from .result import Estimate
 from .rivals import prune
+from .runs import Starts, restart
 from .study import Study
 
 CONFIRMED = 0.2  # of what held-out runs leave without an effect: what it must take away, where a gap is left

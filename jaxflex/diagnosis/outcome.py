@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 
 from .catalogue import Candidate
-from .hypothesis import HORIZONS, Hypothesis, Ranked, Starts
+from .hypothesis import HORIZONS, Hypothesis, Ranked
+from .runs import Starts
 
 
 class Outcome:

@@ -7,9 +7,10 @@ import numpy as np
 from .adopt import amplitudes_of, without
 from .catalogue import Candidate
 from .departure import is_suspect, straightens
-from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search, Starts
+from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search
 from .loose_joint import is_of_loose_joint
 from .outcome import Outcome
+from .runs import Starts
 
 MOST = 2  # rivals of an effect that are tried
 TIE = 0.05  # of the gain: rivals nearer than this are not told apart

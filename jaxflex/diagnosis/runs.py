@@ -61,8 +61,23 @@ class Run:
         """Of every `stride` times `together` pieces the first ones, enough for fits over `together` of them."""
         groups = self.places[: self.pieces // together * together].reshape(-1, together)[::stride]
         places = groups.ravel() if groups.size else self.places
-        at = np.searchsorted(self.places, places)
-        reading, valid, starts, measured = (
-            part[at] for part in (self.reading, self.valid, self.starts, self.measured)
-        )
-        return Run(self.times, self.command, reading, valid, starts, measured, places)
+        return self.only(np.searchsorted(self.places, places))
+
+    def only(self, at: np.ndarray) -> "Run":
+        """These of the pieces, one as often as it is asked for."""
+        parts = (part[at] for part in (self.reading, self.valid, self.starts, self.measured, self.places))
+        return Run(self.times, self.command, *parts)
+
+
+Starts = list[tuple[np.ndarray, Slopes | None]]
+
+
+def starts_of(runs: list[Run]) -> Starts:
+    """The starts of all pieces of these runs, with the slopes there."""
+    return [(run.starts.copy(), run.slopes) for run in runs]
+
+
+def restart(runs: list[Run], starts: Starts) -> None:
+    """Back to what `starts_of` gave."""
+    for run, (kept, slopes) in zip(runs, starts, strict=True):
+        run.starts, run.slopes = kept.copy(), slopes

@@ -4,7 +4,8 @@ import itertools
 
 import numpy as np
 
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Ranked, Search, Starts, allowance, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Ranked, Search, allowance, freedom
+from .runs import Starts
 
 SHORT_LIST = 3
 NEAR = 0.5  # of the strongest: rivals below it are not fitted

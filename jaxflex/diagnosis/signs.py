@@ -10,7 +10,8 @@ import numpy as np
 
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
-from .hypothesis import SOME, settle
+from .calibrate import settle
+from .hypothesis import SOME
 from .prepare import first_starts, make_problem, wanted_channels
 from .runs import Run
 from .shooting import Problem

@@ -8,9 +8,10 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .calibrate import fit
 from .foretell import Foretold, foretell
-from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom, restart
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom
 from .outcome import Outcome
 from .prepare import HeldOut, make_problem
+from .runs import restart
 
 Say = Callable[[str], None]
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from .adopt import amplitudes_of, held_by, with_candidate
 from .catalogue import Candidate
-from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search, Starts
+from .hypothesis import CLOSE, FAIR, HORIZONS, STRONG, Hypothesis, Ranked, Search
+from .runs import Starts
 
 SMALL = 0.3  # misfit a reading, beyond the noise floor, that leaves room for small effects
 SHARE = 0.3  # of a larger one that an effect has to explain
@@ -49,6 +50,9 @@ class Trial:
         self.share = self.fitted.fit.count / fitted.fit.count
         self.explained = {horizon: self.share * cost for horizon, cost in explained.items()}
         self.confirmed: list[Confirmed] = []
+        # of those that were compared, by their identity
+        self._settled: dict[int, Confirmed] = {}
+        self._followed: dict[int, Hypothesis] = {}
 
     def _begun(self, starts: Starts) -> Search:
         self.whole.restart(starts)
@@ -85,30 +89,38 @@ class Trial:
                 continue
             first, second = chosen, entry
             if min(second.found.strength(first.found), first.found.strength(second.found)) > 0:
-                first, second = self._settled(first), self._settled(second)
+                first, second = self.settled(first), self.settled(second)
             chosen = (
                 second if second.found.strength(first.found) > first.found.strength(second.found) else first
             )
-        further = self._followed(chosen) if len(tied) > 1 and chosen.found.horizon < HORIZONS[-1] else None
+        further = self.followed(chosen) if len(tied) > 1 and chosen.found.horizon < HORIZONS[-1] else None
         if further is not None and further.fit.level > FAIR:
             for entry in tied:
                 if entry is chosen:
                     continue
-                other = self._followed(entry)
+                other = self.followed(entry)
                 if other.strength(further) > STRONG and worth_it(further, other):
                     chosen, further = entry, other
         return chosen
 
-    def _settled(self, confirmed: Confirmed) -> Confirmed:
+    def settled(self, confirmed: Confirmed) -> Confirmed:
         """The same with what its parameters, better by what longer horizons taught them, leave over the shortest."""
         found = confirmed.found
-        self.search.restart(confirmed.starts)
-        again = self.search.climb(found.effects, found.fit.vector, to=HORIZONS[0])
-        short = min(again.costs[HORIZONS[0]], found.costs[HORIZONS[0]])
-        return confirmed._replace(found=dataclasses.replace(found, costs=found.costs | {HORIZONS[0]: short}))
+        if id(found) not in self._settled:
+            self.search.restart(confirmed.starts)
+            again = self.search.climb(found.effects, found.fit.vector, to=HORIZONS[0])
+            short = min(again.costs[HORIZONS[0]], found.costs[HORIZONS[0]])
+            costs = found.costs | {HORIZONS[0]: short}
+            known = confirmed._replace(found=dataclasses.replace(found, costs=costs))
+            self._settled |= {id(found): known, id(known.found): known}
+        return self._settled[id(found)]
 
-    def _followed(self, confirmed: Confirmed) -> Hypothesis:
-        return followed(self.whole, *self.base(confirmed), confirmed.found.fit.vector)[0]
+    def followed(self, confirmed: Confirmed) -> Hypothesis:
+        """The same fitted to all pieces over as long as it follows."""
+        found = confirmed.found
+        if id(found) not in self._followed:
+            self._followed[id(found)] = followed(self.whole, *self.base(confirmed), found.fit.vector)[0]
+        return self._followed[id(found)]
 
     def base(self, confirmed: Confirmed) -> tuple[Hypothesis, Starts]:
         """Where to go on from with one of them, and where all pieces start there.
@@ -126,7 +138,8 @@ def followed(
 ) -> tuple[Hypothesis, Starts]:
     """The hypothesis fitted from `vector` over as long as it follows, and where its pieces start."""
     search.restart(starts)
-    begun = base if base.is_fitted else None
+    # where nothing shows a load, a fit comes nearer each time that it is gone on with
+    begun = base if base.is_fitted and not search.problem.setting.hidden else None
     return search.climb(base.effects, vector, ceiling=CLOSE, begun=begun), search.starts()
 
 

@@ -5,9 +5,10 @@ import pytest
 
 from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.describe import bends_before_it_slides, lacking
+from jaxflex.diagnosis.describe import _measure, bends_before_it_slides, lacking
 from jaxflex.diagnosis.estimates import OWN_ERROR, own_error
 from jaxflex.diagnosis.find import find
+from jaxflex.diagnosis.foretell import Foretold
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
 from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.effects import EFFECTS
@@ -64,3 +65,9 @@ def test_friction_that_bends_is_told_from_friction_that_does_not(swung, preslidi
     assert value("torque") == pytest.approx(0.01, rel=0.03)
     if presliding:
         assert value("presliding") == pytest.approx(presliding, rel=0.1)
+
+
+@pytest.mark.parametrize("span, said", [(1.0, "over 1 s from"), (0.3, "over 1 s (0.3 s after) from")])
+def test_what_is_foretold_for_less_long_is_said_to_be(span, said):
+    before, after = (Foretold({}, {}, [], [], seconds) for seconds in (1.0, span))
+    assert said in _measure(before, after)

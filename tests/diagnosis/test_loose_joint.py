@@ -11,10 +11,13 @@ from controllers import Replayed, Step
 from jaxflex.diagnosis.adopt import adopt
 from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
-from jaxflex.diagnosis.hypothesis import HORIZONS
+from jaxflex.diagnosis.flanks import PLACES, join
+from jaxflex.diagnosis.foretell import LOST, foretell
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
 from jaxflex.diagnosis.loose_joint import FLANKS, best_from, first_gap, loosened
-from jaxflex.diagnosis.plant import hidden_loads
+from jaxflex.diagnosis.plant import hidden_loads, twist_place
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
+from jaxflex.diagnosis.runs import starts_of
 from jaxflex.diagnosis.study import Study
 from jaxflex.files.arm_file import ArmFile
 
@@ -54,6 +57,39 @@ def test_what_play_does_not_explain_with_flanks_as_guessed_is_left_at_that(study
     contact = [k for k, part in enumerate(study.search.parameters.nominal) if part.is_of_contact]
     assert found.costs.keys() == {HORIZONS[0]} and found.fit.level > 0.5
     assert not found.fit.vector[contact].any()
+
+
+def test_a_load_at_rest_between_the_flanks_begins_where_those_after_it_say(study):
+    """No reading of the first piece shows where in the play its load rests."""
+    problem = study.prepared.problem
+    whole, parameters = study.prepared.calibration[0], study.search.parameters
+    vector = adopt(parameters, parameters.start, PLAY, (GAP,))
+    run = whole.only(np.arange(whole.pieces))
+    rest, twist = 0.3 * GAP, twist_place(parameters.arm.assemble(), 0)
+    run.starts[0] = 0.0
+    run.starts[0, twist] = rest
+    for _ in range(3):
+        shown = problem.predict(run, vector)
+        run.starts[1:] = shown.end[:-1]
+    true = run.starts[:3].copy()
+    run.reading = problem.predict(run, vector).reading
+    join(problem, [run], vector, 3)
+    assert run.starts[0, twist] == rest
+    run.starts[0, twist] = -rest
+    before = problem.misfit(run, problem.predict(run, vector))[:3]
+    join(problem, [run], vector, 3)
+    assert abs(run.starts[0, twist] - rest) < GAP / PLACES
+    assert problem.misfit(run, problem.predict(run, vector))[:3].mean() < 0.1 * before.mean()
+    np.testing.assert_allclose(run.starts[1:3, twist], true[1:, twist], atol=GAP / PLACES)
+
+
+def test_pieces_are_taken_as_often_as_they_are_asked_for(study):
+    whole = study.prepared.calibration[0]
+    some = whole.only(np.array([4, 4, 7]))
+    np.testing.assert_array_equal(some.places, whole.places[[4, 4, 7]])
+    np.testing.assert_array_equal(some.reading, whole.reading[[4, 4, 7]])
+    some.starts[0] = np.nan
+    assert np.isfinite(whole.starts).all()
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +133,29 @@ def test_play_before_a_load_that_nothing_shows_is_found(axis, size):
     assert over_a_second.horizon == HORIZONS[-1] and over_a_second.fit.level < 1.1
     place = axis.search.parameters.position("backlash", "joint_1", "gap")
     np.testing.assert_allclose(over_a_second.fit.vector[place], GAP, rtol=0.02)
+
+
+def test_a_load_that_cannot_be_followed_is_foretold_for_as_long_as_it_can(axis, monkeypatch):
+    vector = adopt(axis.search.parameters, axis.search.parameters.start, PLAY, (GAP,))
+    settled = axis.search.settle(vector)
+    found = Hypothesis((PLAY,), settled, 1, {1: settled.cost})
+    runs = axis.prepared.held_out
+    tried = []
+
+    def fitted(problem, runs, vector, freedom, horizon, *args):
+        before = starts_of(runs)
+        level = {1: 1.0, 3: 0.9 * LOST, 10: LOST**2}[horizon]
+        cost = level * settled.count
+        for run in runs:
+            run.starts = run.starts + 1e-3 * horizon
+        tried.append((horizon, before, starts_of(runs)))
+        return dataclasses.replace(settled, cost=cost, prior=0.0)
+
+    monkeypatch.setattr("jaxflex.diagnosis.foretell.fit", fitted)
+    told = foretell(axis.prepared.problem, runs, found)
+    assert [horizon for horizon, *_ in tried] == [1, 3, 10]
+    np.testing.assert_array_equal(told.starts[0][0], tried[1][2][0][0])
+    assert told.span == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,31 @@ def test_what_was_fitted_is_not_fitted_again(swung, monkeypatch):
     assert seen == [None, found]
 
 
+def test_what_nothing_shows_is_gone_on_with(swung, monkeypatch):
+    search = swung()
+    base, starts = settled_at(search, (), search.parameters.start)
+    found = search.climb((), base.fit.vector, to=1)
+    hidden = dataclasses.replace(search.problem.setting, hidden=[1])
+    monkeypatch.setattr(search.problem, "setting", hidden)
+    fitted = []
+    monkeypatch.setattr(Search, "climb", lambda *args, **options: fitted.append(options["begun"]) or found)
+    followed(search, found, starts, found.fit.vector)
+    assert fitted == [None]
+
+
+def test_those_that_are_as_good_are_compared_once(long, monkeypatch):
+    start = long.parameters.start
+    base, starts = settled_at(long, (), start)
+    fitted = long.climb((), start, to=1)
+    trial = Trial(long, fitted, long.starts(), {}, by_some=False)
+    trial.confirm([Ranked(COULOMB, (0.005,), 0.0, 0.0)], base, starts)
+    (confirmed,) = trial.confirmed
+    settled, further = trial.settled(confirmed), trial.followed(confirmed)
+    monkeypatch.setattr(Search, "climb", None)
+    assert trial.settled(confirmed) is settled is trial.settled(settled)
+    assert trial.followed(confirmed) is further
+
+
 def test_what_is_needed_is_seen_in_a_part_of_the_pieces(long, monkeypatch):
     """Friction that a drag was added to, which does nothing."""
     start = long.parameters.start
@@ -162,7 +187,7 @@ def test_rivals_that_lead_over_different_horizons_are_settled_before_one_is_chos
 
     class Settled(Trial):
         def __init__(self):
-            self.search, self.by_some = Settling(), False
+            self.search, self.by_some, self._settled = Settling(), False, {}
 
     gain, spring = reached((GAIN,), {1: 8.26e3, 10: 9.09e3}), reached((SPRING,), {1: 8.37e3, 10: 8.94e3})
     assert gain.strength(spring) > spring.strength(gain) > 0
