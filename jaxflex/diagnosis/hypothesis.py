@@ -169,6 +169,15 @@ class Search:
         """The same search with one in SOME of the pieces, for fits over `together` of them."""
         return Search(self.problem, [run.thinned(SOME, together) for run in self.runs], self.say)
 
+    def by_some(self, found: Hypothesis, starts: Starts) -> tuple["Search", Hypothesis]:
+        """The same search with one in SOME of the pieces, which start there, and what `found` leaves of them."""
+        self.restart(starts)
+        few = self.thinned()
+        begun = few.starts()
+        own = few.climb(found.effects, found.fit.vector, to=HORIZONS[0], most=1)
+        few.restart(begun)
+        return few, own
+
     def starts(self) -> Starts:
         """The starts of all pieces, with the slopes there, to come back to."""
         return starts_of(self.runs)

@@ -40,7 +40,7 @@ LESS = 0.5  # of the same: what a loose joint may leave to be gone on with
 TURNS = 3  # of trying the other flank and fitting again
 HELPS = 0.9  # of the cost: a turn that leaves more has not helped
 FIRST = 6  # iterations that tell sizes apart
-PROMISING = 0.75  # of a misfit beyond the noise: what a loose joint, its contact as guessed, may leave
+LIKELY = 0.75  # of a misfit beyond the noise: what a loose joint, its contact as guessed, may leave
 
 
 def loosened(file: ArmFile, joint: int, contact: dict[str, tuple[float, float]]) -> ArmFile:
@@ -88,7 +88,7 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             few = study.search.thinned(horizon if bends or candidate is spring else HORIZONS[-1])
             beside = bool(other.outcome.final.effects)  # which bend the parameters until they are joined
             far = horizon == HORIZONS[0] and left > CLOSE
-            limit = 1 + PROMISING * (left - 1) if bends and far and not beside else np.inf
+            limit = 1 + LIKELY * (left - 1) if bends and far and not beside else np.inf
             turns = 0 if bends and beside else TURNS
             fitted = best_from(few, candidate, sizes, limit, turns)
             other.search.say(f"tried {candidate.effect} at {candidate.location}: {fitted.fit.level:.3g}")
@@ -207,7 +207,7 @@ def without_contact(parameters: Parameters, candidate: Candidate) -> Freedom:
     )
 
 
-def turned(search: Search, fitted: Hypothesis, joint: int, turns: int = TURNS) -> Hypothesis:
+def turned(search: Search, fitted: Hypothesis, joint: int, turns: int) -> Hypothesis:
     """Fitted again with the pieces that are lost begun at the flank that suits them, `turns` times while that helps."""
     for _ in range(turns):
         if fitted.fit.level < CLOSE:

@@ -57,11 +57,7 @@ def _lost_by_some(search: Search, outcome: Outcome, rest: tuple[Candidate, ...],
     """
     if not search.has_to_spare:
         return 0.0
-    search.restart(outcome.final_starts)
-    few = search.thinned()
-    starts = few.starts()
-    own = few.climb(outcome.final.effects, outcome.final.fit.vector, to=HORIZONS[0], most=1)
-    few.restart(starts)
+    few, own = search.by_some(outcome.final, outcome.final_starts)
     found = few.climb(rest, vector, to=HORIZONS[0], iterations=3)
     if found.closest < CLOSE * max(own.closest, 1.0) or own.strength(found) < STRONG:
         return 0.0
@@ -131,9 +127,7 @@ def _promises(
     at_floor = final.fit.level < VERY_NEAR
     if outcome.nominal.closest < limit and not at_floor:
         return True
-    search.restart(starts)
-    few = search.thinned()
-    own = few.climb(final.effects, final.fit.vector, to=HORIZONS[0], most=1)
+    few, own = search.by_some(final, starts)
     rival = few.confirm(base, few.starts(), item, HORIZONS[0])
     return rival.closest < limit and not (at_floor and own.strength(rival) > STRONG)
 

@@ -43,10 +43,7 @@ class Trial:
     ):
         self.whole = search
         self.by_some = by_some and search.has_to_spare
-        self.search = self._begun(starts)
-        self.fitted = fitted
-        if self.by_some:
-            self.fitted = self.search.climb(fitted.effects, fitted.fit.vector, to=HORIZONS[0], most=1)
+        self.search, self.fitted = search.by_some(fitted, starts) if self.by_some else (search, fitted)
         self.share = self.fitted.fit.count / fitted.fit.count
         self.explained = {horizon: self.share * cost for horizon, cost in explained.items()}
         self.confirmed: list[Confirmed] = []
