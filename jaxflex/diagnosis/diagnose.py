@@ -78,7 +78,7 @@ def diagnose(
             return chosen
         say("what is left may lie between a motor and its link")
         for loose, start in loose_joints(chosen, recordings):
-            loose.outcome = find_from(loose.search, start, chosen.outcome, excused=False)
+            loose.outcome = find_from(loose.search, start, chosen.outcome)
             if _solves(loose, chosen):
                 loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
                 chosen = loose

@@ -37,17 +37,16 @@ def find(search: Search) -> Outcome:
     return _added_to(search, outcome, base, starts)
 
 
-def find_from(search: Search, first: Hypothesis, other: Outcome, excused: bool = True) -> Outcome:
+def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
     """Add effects to a first one that is settled already, the pieces starting where they are.
 
     `other`: what came of the arm as it was stated. What it left without any effect is what there was
-    to explain. Parts of the arm are not tried, as they were there; without `excused`, what sets the arm's
-    parameters straight is taken although the law of `first`, which is not the true one, may have bent them.
+    to explain, and what parts of the arm imitate has been seen there.
     """
     outcome = Outcome(other.nominal, other.nominal_starts, other.nominal_level)
     starts = search.starts()
     _advance(search, outcome, first, starts, first.fit.vector)
-    return _added_to(search, outcome, first, starts, parts=False, excused=excused)
+    return _added_to(search, outcome, first, starts, parts=False)
 
 
 def calibrated(
@@ -67,16 +66,11 @@ def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts,
 
 
 def _added_to(
-    search: Search,
-    outcome: Outcome,
-    base: Hypothesis,
-    starts: Starts,
-    parts: bool = True,
-    excused: bool = True,
+    search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, parts: bool = True
 ) -> Outcome:
     """The outcome with what else stands out; its final hypothesis began at `base`."""
     while len(outcome.final.effects) < MOST_EFFECTS:
-        found = next_effect(search, outcome, base, starts, parts, excused)
+        found = next_effect(search, outcome, base, starts, parts)
         if found is None:
             break
         base, starts, vector = found
@@ -90,17 +84,15 @@ def _added_to(
 
 
 def next_effect(
-    search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool, excused: bool
+    search: Search, outcome: Outcome, base: Hypothesis, base_starts: Starts, parts: bool
 ) -> tuple[Hypothesis, Starts, np.ndarray] | None:
     """What to add to the outcome's final hypothesis, which began at `base`; None if nothing stands out.
 
     A hypothesis to go on from, where its pieces start, and the parameters as fitted. `parts`: whether
-    changes of the arm's parts are tried where its parameters went too far; `excused`: farther than the laws
-    of the effects found may bend them.
+    all changes of the arm's parts are tried where its parameters went too far, and not the likeliest alone.
     """
     fitted, starts, explained = outcome.final, outcome.final_starts, outcome.explained_over()
-    excuse = outcome.explained if excused else 0.0
-    suspect = (parts or not excused) and is_suspect(search.parameters, fitted, excuse)
+    suspect = is_suspect(search.parameters, fitted, outcome.explained)
     little = outcome.level - 1 < LITTLE * (outcome.nominal_level - 1)
     if fitted.effects and fitted.closest < CLOSE and little and not suspect:
         return None
@@ -116,7 +108,9 @@ def next_effect(
         form = form_error(fitted.effects, explained)
         ranked = [item for item in ranked if item.gain > form[item.horizon]]
     tried = _short_list(ranked)
-    trial = Trial(search, fitted, starts, explained, by_some=far)
+    # strain shows over any horizon; on a loose joint, fits over longer ones take long
+    horizon = HORIZONS[0] if suspect and not parts else HORIZONS[-1]
+    trial = Trial(search, fitted, starts, explained, far, horizon)
     trial.confirm(tried, *((base, base_starts) if far else (fitted, starts)))
     if far and not any(entry.strength > STRONG for entry in trial.worthy):
         # parameters bent by two effects may leave less than either of them does alone
@@ -124,11 +118,11 @@ def next_effect(
             first, first_starts = adopted(search, base, base_starts, item)
             more = search.rank(first.fit.vector, first.effects, HORIZONS[:1])
             trial.confirm(_short_list(more)[:PAIR], first, first_starts)
-    excuse *= trial.share
+    all_explained = trial.share * outcome.explained
     chosen = trial.simplest(trial.confirmed) if suspect and trial.confirmed else None
     if parts and suspect and not (chosen and decisive(search, trial.fitted, chosen.found)):
         changes = search.parts(base.effects)
-        if chosen and is_enough(search, chosen.found, excuse):
+        if chosen and is_enough(search, chosen.found, all_explained):
             changes = imitating(trial.search, chosen, changes)
         if changes:
             search.restart(base_starts)
@@ -139,7 +133,7 @@ def next_effect(
         return None
     chosen = trial.simplest(trial.worthy)
     best = chosen.found
-    straight = suspect and straightens(search.parameters, trial.fitted, best, excuse)
+    straight = suspect and straightens(search.parameters, trial.fitted, best, all_explained)
     if not (chosen.strength > STRONG or straight):
         return None
     outcome.close[best.effects[-1].key] = nearly_as_good(search, trial.fitted, best, trial.worthy)

@@ -70,6 +70,8 @@ def weigh(search: Search, outcome: Outcome) -> None:
     One that explains more, or as much with fewer parameters, takes its place.
     """
     for place, effect in enumerate(outcome.final.effects):
+        if is_of_loose_joint(search.parameters, effect):
+            continue  # found because nothing else would do
         final, starts = outcome.final, outcome.final_starts
         rest = tuple(e for e in final.effects if e is not effect)
         search.restart(starts)
@@ -99,7 +101,7 @@ def weigh(search: Search, outcome: Outcome) -> None:
                 or (is_all_there_is(final, rival) and item.candidate.count <= effect.count)
             )
             simpler = same and item.candidate.count < effect.count
-            if (better or simpler) and not is_of_loose_joint(search.parameters, effect):
+            if better or simpler:
                 search.say(
                     f"{item.candidate.effect} at {item.candidate.location} in place of {effect.effect}"
                 )

@@ -34,16 +34,23 @@ class Confirmed(NamedTuple):
 class Trial:
     """Candidates tried beside a hypothesis that is `fitted`, its pieces starting at `starts`.
 
-    `explained` as for `Hypothesis.strength`; `by_some`: a part of the pieces will do, whose `share` it is.
-    `confirmed`: those that make sense, as fitted.
+    `explained` as for `Hypothesis.strength`; `by_some`: a part of the pieces will do, whose `share` it is;
+    `horizon`: up to which they are fitted. `confirmed`: those that make sense, as fitted.
     """
 
     def __init__(
-        self, search: Search, fitted: Hypothesis, starts: Starts, explained: dict[int, float], by_some: bool
+        self,
+        search: Search,
+        fitted: Hypothesis,
+        starts: Starts,
+        explained: dict[int, float],
+        by_some: bool,
+        horizon: int = HORIZONS[-1],
     ):
         self.whole = search
         self.by_some = by_some and search.has_to_spare
         self.search, self.fitted = search.by_some(fitted, starts) if self.by_some else (search, fitted)
+        self.horizon = min(horizon, self.fitted.horizon)
         self.share = self.fitted.fit.count / fitted.fit.count
         self.explained = {horizon: self.share * cost for horizon, cost in explained.items()}
         self.confirmed: list[Confirmed] = []
@@ -58,9 +65,11 @@ class Trial:
     def confirm(self, items: list[Ranked], before: Hypothesis, starts: Starts) -> None:
         """Fit each of the candidates, added to `before`, whose pieces start at `starts`."""
         search = self._begun(starts)
-        begun, horizon = search.starts(), self.fitted.horizon
+        begun = search.starts()
         for item in items:
-            found, found_starts = confirmed_from(search, before, begun, item, horizon, without=self.fitted)
+            found, found_starts = confirmed_from(
+                search, before, begun, item, self.horizon, without=self.fitted
+            )
             search.say(f"tried {item.candidate.effect} at {item.candidate.location}: {found.fit.level:.3g}")
             if search.sensible(found):
                 strength = found.strength(self.fitted, self.explained)
