@@ -12,7 +12,7 @@ from .finer import finer, is_coarse
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, PROMISING, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG, Hypothesis
-from .loose_joint import is_of_loose_joint, loose_joints
+from .loose_joint import is_of_loose_joint, loose_joints, with_spring_alone
 from .needed import drop_unconfirmed, drop_unseen, name_uneven_first, unseen
 from .prepare import HeldOut
 from .result import Diagnosis
@@ -74,14 +74,15 @@ def diagnose(
         return other
 
     def loosened(chosen: Study) -> Study:
-        if not _leaves_much(chosen):
+        other = with_spring_alone(chosen)
+        if other is chosen and not _leaves_much(chosen):
             return chosen
         say("what is left may lie between a motor and its link")
-        for loose, start in loose_joints(chosen, recordings):
-            loose.outcome = find_from(loose.search, start, chosen.outcome)
-            if _solves(loose, chosen):
+        for loose, start in loose_joints(other, recordings):
+            loose.outcome = find_from(loose.search, start, other.outcome)
+            if _solves(loose, other):
                 loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
-                chosen = loose
+                chosen = other = loose
         return chosen
 
     likely = (gauged, loosened) if _astray_in_deflection(chosen) else (loosened, gauged)

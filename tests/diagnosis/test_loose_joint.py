@@ -1,5 +1,6 @@
 """Motor and link that come apart: found from sizes far from the true one, with pieces that may run away."""
 
+import copy
 import dataclasses
 
 import jax.numpy as jnp
@@ -14,7 +15,8 @@ from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.flanks import PLACES, join
 from jaxflex.diagnosis.foretell import LOST, foretell
 from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
-from jaxflex.diagnosis.loose_joint import FLANKS, best_from, first_gap, loosened
+from jaxflex.diagnosis.loose_joint import FLANKS, best_from, first_gap, loosened, with_spring_alone
+from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.plant import hidden_loads, twist_place
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.runs import starts_of
@@ -27,6 +29,10 @@ pytestmark = pytest.mark.optimised
 
 GAP = 0.01  # rad
 PLAY = Candidate("backlash", "joint_1", ("gap",))
+SPRING = Candidate("joint_flexibility", "joint_1", ("compliance",))
+HUB = Candidate("hub_inertia", "joint_1", ("inertia",))
+GAIN = Candidate("sensor_gain", "tip_deflection_1", ("error",))
+COULOMB = Candidate("coulomb_friction", "joint_1", ("torque",))
 
 
 @pytest.fixture(scope="module")
@@ -176,6 +182,32 @@ def test_a_joint_is_judged_over_the_shortest_horizon_that_leaves_something(level
             return levels[horizon]
 
     assert first_gap(Told()) == gap
+
+
+@pytest.mark.parametrize(
+    "added, alone",
+    [
+        ((), False),
+        ((SPRING,), False),
+        ((SPRING, HUB), True),
+        ((COULOMB, SPRING, HUB, GAIN), True),
+        ((SPRING, HUB, COULOMB), False),  # which no inertia stands for
+        ((HUB, GAIN), False),
+    ],
+)
+def test_a_spring_is_looked_at_without_what_sets_its_parameters_straight(study, added, alone):
+    settled = study.search.settle(study.search.parameters.start)
+    found = [Hypothesis(added[:k], settled, 10, {10: settled.cost}) for k in range(len(added) + 1)]
+    outcome = Outcome(found[0], study.search.starts(), 9.0)
+    outcome.passed = {one.effects: (one, study.search.starts()) for one in found[:-1]}
+    outcome.final = found[-1]
+    with_parts = copy.copy(study)
+    with_parts.outcome = outcome
+    before = with_spring_alone(with_parts)
+    assert (before is not with_parts) == alone
+    if alone:
+        assert before.outcome.final.effects == added[: added.index(SPRING) + 1]
+        assert before.outcome.level == settled.level and outcome.final.effects == added
 
 
 def test_harder_flanks_take_more_steps(study):
