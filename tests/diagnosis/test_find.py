@@ -29,7 +29,7 @@ def test_what_stands_out_at_one_horizon_does_not_hide_what_does_at_another():
     assert [item.candidate for item in _short_list(items)] == [COULOMB, DRAG]
 
 
-@pytest.mark.parametrize("heavier, effects", [(2e-3, 2), (1e-4, 1)])
+@pytest.mark.parametrize("heavier, effects", [(2e-3, 2), pytest.param(1e-4, 1, marks=pytest.mark.slow)])
 def test_what_sets_strained_parameters_straight_is_found_without_trying_all_parts(
     swung, monkeypatch, heavier, effects
 ):

@@ -99,6 +99,7 @@ def test_a_start_is_the_same_motion_with_more_modes(loose):
             np.testing.assert_array_equal(new[:, m - 1], old[:, n - 1])
 
 
+@pytest.mark.slow
 def test_what_three_modes_made_is_followed_by_three_only():
     """Friction of a plant with three modes, begun from what a search with two made of it."""
     file, recordings = recorded(CoulombFriction(0.03, presliding=5e-4), modes=MODES)

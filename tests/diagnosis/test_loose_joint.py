@@ -132,7 +132,9 @@ def test_a_load_that_nothing_shows_goes_on_from_piece_to_piece(axis, study):
     np.testing.assert_array_equal(run.starts[:, [0, 2]], shown)
 
 
-@pytest.mark.parametrize("size", [GAP / 2, pytest.param(2 * GAP, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "size", [pytest.param(GAP / 2, marks=pytest.mark.slow), pytest.param(2 * GAP, marks=pytest.mark.slow)]
+)
 def test_play_before_a_load_that_nothing_shows_is_found(axis, size):
     found = best_from(axis.search, PLAY, (size,))
     over_a_second = axis.search.climb(found.effects, found.fit.vector)
