@@ -17,7 +17,7 @@ from .runs import Run
 from .shooting import Problem
 
 ASTRAY = 50.0  # misfit a reading over the shortest horizon, in units of the noise: signs are tried beyond it
-BETTER = 0.25  # of the misfit: what is left at most where a sign was wrong
+BETTER = 0.9  # of the misfit: what is left at most where a sign was wrong; where all are right, more than all of it
 
 
 def righted(file: ArmFile, recordings: Sequence[Recording]) -> list[Recording]:

@@ -14,14 +14,14 @@ pytestmark = pytest.mark.optimised
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory):
-    """An arm and a recording of it, with dry friction hidden."""
+    """An arm and a recording of it, with dry friction and a cable hidden, which leave a gap of hundreds."""
     folder = tmp_path_factory.mktemp("case")
-    (made,) = make_cases("single_link", [("coulomb_friction",)], [30.0], [0])
+    (made,) = make_cases("single_link", [("coulomb_friction", "cable_stiffness")], [1.0], [0], typical=True)
     write_case(made, folder)
     return jf.read_arm_file(folder / "arm.toml"), jf.read_recording(folder / "run_1.csv")
 
 
-@pytest.mark.parametrize("names", [(), ("angle_1",), ("voltage_1",)], ids="+".join)
+@pytest.mark.parametrize("names", [(), ("angle_1",), ("voltage_1",), ("current_1",)], ids="+".join)
 def test_wrong_signs_are_turned_round_and_said(case, names):
     file, recording = case
     flipped = {n: -v if n in names else v for n, v in recording.channels.items()}
