@@ -7,12 +7,12 @@ from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .departure import is_bent
 from .describe import describe
-from .find import HALFWAY, find, find_from
+from .find import HALFWAY, find, find_from, gone_on
 from .finer import finer, is_coarse
 from .foretell import AT_FLOOR
 from .gauge import BY_GAUGE, PROMISING, by_gauge
 from .hypothesis import CLOSE, FAIR, HORIZONS, LITTLE, STRONG, Hypothesis
-from .loose_joint import is_of_loose_joint, loose_joints, with_spring_alone
+from .loose_joint import is_of_loose_joint, loose_joints
 from .needed import drop_unconfirmed, drop_unseen, name_uneven_first, unseen
 from .prepare import HeldOut
 from .result import Diagnosis
@@ -74,20 +74,19 @@ def diagnose(
         return other
 
     def loosened(chosen: Study) -> Study:
-        other = with_spring_alone(chosen)
-        if other is chosen and not _leaves_much(chosen):
-            return chosen
-        say("what is left may lie between a motor and its link")
-        for loose, start in loose_joints(other, recordings):
-            loose.outcome = find_from(loose.search, start, other.outcome)
-            if _solves(loose, other):
-                loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
-                chosen = other = loose
+        if _is_strained(chosen) if chosen.outcome.waiting else _leaves_much(chosen):
+            say("what is left may lie between a motor and its link")
+            for loose, start in loose_joints(chosen, recordings):
+                loose.outcome = find_from(loose.search, start, chosen.outcome)
+                if _solves(loose, chosen):
+                    loose.notes = tuple(dict.fromkeys((*loose.notes, *chosen.notes)))
+                    chosen = loose
         return chosen
 
     likely = (gauged, loosened) if _astray_in_deflection(chosen) else (loosened, gauged)
     for other_arm in likely:
         chosen = other_arm(chosen)
+    chosen.outcome = gone_on(chosen.search, chosen.outcome)
     if is_coarse(chosen):
         chosen = finer(chosen, recordings) or chosen
     drop_unconfirmed(chosen)

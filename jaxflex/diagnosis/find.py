@@ -30,10 +30,23 @@ HALFWAY = 0.5  # of such a misfit: what an effect that brings it lower has to be
 
 
 def find(search: Search) -> Outcome:
-    """Add effects one at a time until nothing in the catalogue stands out."""
+    """Add effects one at a time until nothing in the catalogue stands out.
+
+    The outcome waits to be `gone_on` with where a spring between motor and link leaves nothing but strained
+    parameters: its joint may come apart, and parts of the arm would make up for what turns on the motor's side.
+    """
     base, starts = settled_at(search, (), search.parameters.start)
     nominal = calibrated(search, base, starts, base.fit.vector)
     outcome = Outcome(*nominal, search.over_a_second(nominal[0]))
+    return _added_to(search, outcome, base, starts, waits=True)
+
+
+def gone_on(search: Search, outcome: Outcome) -> Outcome:
+    """The outcome with what else stands out, if it waits."""
+    if outcome.waiting is None:
+        return outcome
+    base, starts = outcome.waiting
+    outcome.waiting = None
     return _added_to(search, outcome, base, starts)
 
 
@@ -41,7 +54,7 @@ def find_from(search: Search, first: Hypothesis, other: Outcome) -> Outcome:
     """Add effects to a first one that is settled already, the pieces starting where they are.
 
     `other`: what came of the arm as it was stated. What it left without any effect is what there was
-    to explain, and what parts of the arm imitate has been seen there.
+    to explain. Of parts of the arm the likeliest alone are tried, over the shortest horizon.
     """
     outcome = Outcome(other.nominal, other.nominal_starts, other.nominal_level)
     starts = search.starts()
@@ -66,10 +79,18 @@ def _advance(search: Search, outcome: Outcome, base: Hypothesis, starts: Starts,
 
 
 def _added_to(
-    search: Search, outcome: Outcome, base: Hypothesis, starts: Starts, parts: bool = True
+    search: Search,
+    outcome: Outcome,
+    base: Hypothesis,
+    starts: Starts,
+    parts: bool = True,
+    waits: bool = False,
 ) -> Outcome:
     """The outcome with what else stands out; its final hypothesis began at `base`."""
     while len(outcome.final.effects) < MOST_EFFECTS:
+        if waits and awaits_a_loose_joint(search, outcome):
+            outcome.waiting = base, starts
+            return outcome
         found = next_effect(search, outcome, base, starts, parts)
         if found is None:
             break
@@ -93,8 +114,7 @@ def next_effect(
     """
     fitted, starts, explained = outcome.final, outcome.final_starts, outcome.explained_over()
     suspect = is_suspect(search.parameters, fitted, outcome.explained)
-    little = outcome.level - 1 < LITTLE * (outcome.nominal_level - 1)
-    if fitted.effects and fitted.closest < CLOSE and little and not suspect:
+    if leaves_little(outcome) and not suspect:
         return None
     search.restart(starts)
     ranked = search.rank(fitted.fit.vector, fitted.effects, tuple(h for h in HORIZONS if h <= fitted.horizon))
@@ -108,7 +128,7 @@ def next_effect(
         form = form_error(fitted.effects, explained)
         ranked = [item for item in ranked if item.gain > form[item.horizon]]
     tried = _short_list(ranked)
-    # strain shows over any horizon; on a loose joint, fits over longer ones take long
+    # strain shows over any horizon, and where effects were found before, fits over longer ones take long
     horizon = HORIZONS[0] if suspect and not parts else HORIZONS[-1]
     trial = Trial(search, fitted, starts, explained, far, horizon)
     trial.confirm(tried, *((base, base_starts) if far else (fitted, starts)))
@@ -138,6 +158,20 @@ def next_effect(
         return None
     outcome.close[best.effects[-1].key] = nearly_as_good(search, trial.fitted, best, trial.worthy)
     return *trial.base(chosen), best.fit.vector
+
+
+def leaves_little(outcome: Outcome) -> bool:
+    """True if effects were found that leave hardly any of the gap."""
+    final = outcome.final
+    little = outcome.level - 1 < LITTLE * (outcome.nominal_level - 1)
+    return bool(final.effects) and final.closest < CLOSE and little
+
+
+def awaits_a_loose_joint(search: Search, outcome: Outcome) -> bool:
+    """True if a spring between motor and link leaves nothing but parameters that went too far."""
+    springs = [effect for effect in outcome.final.effects if effect.effect == "joint_flexibility"]
+    strained = leaves_little(outcome) and is_suspect(search.parameters, outcome.final, outcome.explained)
+    return bool(springs) and strained
 
 
 def decisive(search: Search, before: Hypothesis, best: Hypothesis) -> bool:

@@ -51,16 +51,16 @@ def choose_flanks(problem: Problem, runs: list[Run], vector: np.ndarray, joint: 
         run.starts, run.slopes = starts, None
 
 
-def join(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: int) -> None:
+def join_pieces(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: int) -> None:
     """Join the pieces of these runs for a fit over `horizon` of them, loads in a play from where that suits them."""
     for run in runs:
         problem.join(run, vector)
         for joint, gap in problem.setting.parameters.plays.items():
             if vector[gap] > 0:
-                rest(problem, run, vector, joint, horizon)
+                _rest(problem, run, vector, joint, horizon)
 
 
-def rest(problem: Problem, run: Run, vector: np.ndarray, joint: int, horizon: int) -> None:
+def _rest(problem: Problem, run: Run, vector: np.ndarray, joint: int, horizon: int) -> None:
     """Begin pieces that follow none, and with those after them are lost, where in the play suits these `horizon`.
 
     A load at rest between the flanks leaves no trace until one of them meets it.

@@ -9,9 +9,10 @@ import numpy as np
 
 from .calibrate import Freedom, fit
 from .chains import whitened
-from .flanks import choose_flanks, join
+from .flanks import choose_flanks
+from .further import fit_further
 from .hypothesis import HORIZONS, Hypothesis
-from .runs import Run, Starts, restart, starts_of
+from .runs import Run, Starts, starts_of
 from .shooting import Problem
 
 LOST = 3.0  # times the misfit over a shorter horizon: a load in a play cannot be followed for so long
@@ -60,11 +61,9 @@ def foretell(problem: Problem, runs: list[Run], hypothesis: Hypothesis) -> Foret
             choose_flanks(problem, [run], found.vector, joint)
         reached = HORIZONS[0]
         for horizon in HORIZONS[1:]:
-            starts = starts_of([run])
-            join(problem, [run], found.vector, horizon)
-            longer = fit(problem, [run], found.vector, held, horizon, 4)
-            if plays and not longer.level < LOST * found.level:
-                restart([run], starts)
+            limit = LOST * found.level if plays else None
+            longer = fit_further(problem, [run], found.vector, held, horizon, limit)
+            if longer is None:
                 break
             found, reached = longer, horizon
         vector, span = found.vector, min(span, reached)

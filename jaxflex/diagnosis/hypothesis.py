@@ -12,7 +12,7 @@ from ..effects import EFFECTS, AbstractBodyEffect, SensorGain, TorqueConstant
 from .adopt import held_by, rise, risen, with_candidate
 from .calibrate import MOST, Fit, Freedom, fit, settle
 from .catalogue import EITHER_SIGN, FORM, Candidate, Motion, candidates, plausible
-from .flanks import join
+from .further import fit_further
 from .locate import LatentForce, latent_forces, strongest_frequencies
 from .parameters import Parameters
 from .runs import Run, Starts, restart, starts_of
@@ -208,14 +208,12 @@ class Search:
                 break
             if horizon in costs:
                 continue
-            starts = self.starts()
-            if found is not None:
-                join(self.problem, self.runs, vector, horizon)
-                if self.parameters.plays:  # where a contact opens and shuts, only slopes near it hold
-                    self.settle(vector, horizon)
-            longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)
-            if found is not None and not longer.level < RUNAWAY * (1 + found.level):
-                self.restart(starts)  # the motion cannot be followed for so long
+            if found is None:
+                longer = fit(self.problem, self.runs, vector, free, horizon, iterations, most=most)
+            else:
+                limit = RUNAWAY * (1 + found.level)
+                longer = fit_further(self.problem, self.runs, vector, free, horizon, limit, iterations, most)
+            if longer is None:
                 break
             found, vector = longer, longer.vector
             costs[horizon] = found.cost

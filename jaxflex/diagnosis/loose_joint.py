@@ -5,20 +5,18 @@ about a motion without it. So they are tried on an arm of their own, from severa
 nothing else explains what was measured.
 """
 
-import copy
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import EFFECTS
 from ..files.arm_file import ArmFile
 from ..files.recording import Recording
 from .adopt import adopt, amplitudes_of
 from .calibrate import Freedom, fit
 from .catalogue import Candidate
 from .flanks import choose_flanks, press
-from .hypothesis import CLOSE, HORIZONS, PARTS, Hypothesis, Search, freedom
+from .hypothesis import CLOSE, HORIZONS, Hypothesis, Search, freedom
 from .parameters import Parameters
 from .study import Study
 
@@ -102,28 +100,6 @@ def loose_joints(other: Study, recordings: Sequence[Recording]) -> list[tuple[St
             tried = [min(tried, key=lambda entry: entry[2])]
         found += [(study, in_full(study.search, fitted)) for study, fitted, level in tried if level < most]
     return found
-
-
-def with_spring_alone(study: Study) -> Study:
-    """The study before other parts of the arm were added to a spring between motor and link; itself if none were.
-
-    What sets parameters straight beside a spring that follows at once may be what turns on the motor's side of it.
-    """
-    outcome, effects = study.outcome, study.outcome.final.effects
-    count = 1 + next(
-        (k for k, effect in enumerate(effects) if effect.effect == "joint_flexibility"), len(effects)
-    )
-    first, rest = effects[:count], effects[count:]
-    if not rest or first not in outcome.passed:
-        return study
-    if not all(issubclass(EFFECTS[effect.effect], PARTS) for effect in rest):
-        return study
-    before = copy.copy(study)
-    before.outcome = copy.copy(outcome)
-    before.outcome.final, before.outcome.final_starts = outcome.passed[first]
-    study.search.restart(before.outcome.final_starts)
-    before.outcome.level = study.search.over_a_second(before.outcome.final)
-    return before
 
 
 def _springs(study: Study) -> dict[int, tuple[float, ...]]:

@@ -13,7 +13,10 @@ class Outcome:
     """What the search came to: the nominal fit, the final one, and rivals of each effect.
 
     `level`: misfit a reading over the longest horizon; `nominal_level`: the same without any effect.
+    `waiting`: of a search that waits, the final hypothesis as it began, and where its pieces started.
     """
+
+    waiting: tuple[Hypothesis, Starts] | None = None
 
     def __init__(self, nominal: Hypothesis, starts: Starts, level: float):
         self.nominal = nominal

@@ -1,18 +1,21 @@
 """What is tried beside what was found, and what the search makes of it."""
 
+import dataclasses
+
 import pytest
 
 from jaxflex.diagnosis import find
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.departure import is_suspect
-from jaxflex.diagnosis.find import _added_to, _short_list, find_from
-from jaxflex.diagnosis.hypothesis import Ranked, Search
+from jaxflex.diagnosis.find import _added_to, _short_list, find_from, gone_on
+from jaxflex.diagnosis.hypothesis import Hypothesis, Ranked, Search
 from jaxflex.diagnosis.outcome import Outcome
 from jaxflex.diagnosis.trial import settled_at
 from jaxflex.effects import CoulombFriction, HubInertia
 
 COULOMB = Candidate("coulomb_friction", "joint_1", ("torque",), (("presliding", 1e-4),), ("presliding",))
 STRIBECK = Candidate("stribeck_friction", "joint_1", ("torque", "level"))
+SPRING = Candidate("joint_flexibility", "joint_1", ("compliance",))
 DRAG = Candidate("quadratic_drag", "joint_1", ("coefficient",))
 
 
@@ -45,6 +48,35 @@ def test_what_sets_strained_parameters_straight_is_found_without_trying_all_part
     assert found.final.effects[0].key == COULOMB.key
     assert len(found.final.effects) == effects
     assert not is_suspect(search.parameters, found.final)
+
+
+@pytest.mark.parametrize(
+    "added, moved, level, waits",
+    [
+        ((SPRING,), 9.0, 1.0, True),
+        ((COULOMB, SPRING), 9.0, 1.0, True),
+        ((SPRING,), 0.5, 1.0, False),  # parameters are where they were stated
+        ((SPRING,), 9.0, 40.0, False),  # something else is left
+        ((COULOMB,), 9.0, 1.0, False),
+        ((), 9.0, 1.0, False),
+    ],
+)
+def test_strain_beside_a_spring_is_left_to_a_joint_that_may_come_apart(
+    search, monkeypatch, added, moved, level, waits
+):
+    base, starts = settled_at(search, (), search.parameters.start)
+    fit = dataclasses.replace(base.fit, cost=level * base.fit.count, prior=0.0)
+    fit.vector[: len(search.parameters.nominal)] = moved
+    outcome = Outcome(dataclasses.replace(base, costs={1: 1e9}), starts, 1e3)
+    outcome.final = Hypothesis(added, fit, 1, {1: fit.cost})
+    outcome.level = level
+    tried = []
+    monkeypatch.setattr(find, "next_effect", lambda *args: tried.append(outcome.waiting))
+    monkeypatch.setattr(find, "prune", lambda *args: None)
+    found = _added_to(search, outcome, base, starts, waits=True)
+    assert (found.waiting is not None) == waits and len(tried) == (not waits)
+    assert gone_on(search, found) is outcome
+    assert outcome.waiting is None and tried == [None]
 
 
 def test_what_is_left_is_of_what_is_kept(search, monkeypatch):
