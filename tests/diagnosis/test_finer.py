@@ -51,11 +51,22 @@ def studied(file, recordings, effects):
     return study
 
 
-def test_friction_that_leaves_little_asks_for_more_modes():
-    file, recordings = recorded(CoulombFriction(0.02, presliding=1e-3))
-    study = Study(file, recordings, HeldOut.ENDS, lambda line: None)
-    found = settled_at(study.search, (FRICTION,), study.search.parameters.start)
-    study.outcome = Outcome(*found, np.inf)
+@pytest.fixture(scope="module")
+def sticking():
+    """The file of a link, and what was recorded of it with friction, which the file lacks."""
+    return recorded(CoulombFriction(0.02, presliding=1e-3))
+
+
+@pytest.fixture
+def settled(sticking):
+    """A study of it that has found friction, at nothing."""
+    study = Study(*sticking, HeldOut.ENDS, lambda line: None)
+    study.outcome = Outcome(*settled_at(study.search, (FRICTION,), study.search.parameters.start), np.inf)
+    return study
+
+
+def test_friction_that_leaves_little_asks_for_more_modes(settled):
+    study, file = settled, settled.file
 
     def asks(level, nominal):
         study.outcome.level, study.outcome.nominal_level = level, nominal
@@ -72,9 +83,9 @@ def test_friction_that_leaves_little_asks_for_more_modes():
 
 
 @pytest.mark.parametrize("loose", [False, True])
-def test_a_start_is_the_same_motion_with_more_modes(loose):
+def test_a_start_is_the_same_motion_with_more_modes(sticking, loose):
     """The same readings, rates and currents; further modes are still, and a twist stays the last coordinate."""
-    file, recordings = recorded(CoulombFriction(0.02, presliding=1e-3))
+    file, recordings = sticking
     if loose:
         joints = tuple(
             dataclasses.replace(own, play=0.01, contact_stiffness=50.0, contact_damping=0.1, motor_share=0.5)
@@ -112,14 +123,12 @@ def test_what_three_modes_made_is_followed_by_three_only():
     assert any(f"{MODES} modes" in note for note in found.notes)
 
 
-def test_more_modes_that_lose_the_motion_are_left(monkeypatch):
-    file, recordings = recorded(CoulombFriction(0.02, presliding=1e-3))
-    study = studied(file, recordings, (FRICTION,))
+def test_more_modes_that_lose_the_motion_are_left(sticking, settled, monkeypatch):
+    final = settled.outcome.final
 
     def lost(search, effects, vector):
-        found, starts = settled_at(search, effects, vector)
-        return dataclasses.replace(found, costs={1: np.inf}), starts
+        return dataclasses.replace(final, costs={1: np.inf}), search.starts()
 
     monkeypatch.setattr("jaxflex.diagnosis.finer.settled_at", lost)
     monkeypatch.setattr("jaxflex.diagnosis.finer.find_from", None)
-    assert finer(study, recordings) is None
+    assert finer(settled, sticking[1]) is None

@@ -52,7 +52,8 @@ def test_what_brings_parameters_back_to_their_nominal_values_leaves_no_gap():
     assert measure([moved], [rig], COARSE)[0][0].size > 3.0
 
 
-def test_cases_are_as_asked(tmp_path):
+def test_cases_are_as_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.blind.make.FINE", COARSE)
     wanted = [("coulomb_friction",), ("sensor_lag",), ()]
     cases = make_cases("single_link", wanted, [3.0], [0])
     assert [c.name for c in cases] == ["coulomb_friction-3-0", "sensor_lag-3-0", "nothing-0"]

@@ -60,6 +60,6 @@ def test_what_is_stored_is_whole(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_runs_reduced(path, monkeypatch, tmp_path):
-    monkeypatch.setenv("JAXFLEX_CACHE", str(tmp_path / "cache"))
+def test_runs_reduced(path, monkeypatch, tmp_path_factory):
+    monkeypatch.setenv("JAXFLEX_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
     execute(path, reduced=True, first=inspect.getsource(strict) + "\nstrict()")
