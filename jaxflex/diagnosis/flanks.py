@@ -63,18 +63,21 @@ def join_pieces(problem: Problem, runs: list[Run], vector: np.ndarray, horizon: 
 def _rest(problem: Problem, run: Run, vector: np.ndarray, joint: int, horizon: int) -> None:
     """Begin pieces that follow none, and with those after them are lost, where in the play suits these `horizon`.
 
-    A load at rest between the flanks leaves no trace until one of them meets it.
+    A load at rest between the flanks leaves no trace until one of them meets it; a fit over fewer pieces may have
+    bent the rest of a start to make up for that, so that places are tried beside what was measured too.
     """
     twist, gap = _play(problem, vector, joint)
     first = np.flatnonzero(~run.follows)
-    tried = np.repeat(run.starts[first, None], 1 + PLACES, axis=1)
-    tried[:, 1:, twist] = np.linspace(-gap / 2, gap / 2, PLACES)
-    at = np.repeat(first, 1 + PLACES)
+    number = 1 + 2 * PLACES
+    tried = np.repeat(run.starts[first, None], number, axis=1)
+    tried[:, 1 + PLACES :] = run.measured[first, None]
+    tried[:, 1:, twist] = np.tile(np.linspace(-gap / 2, gap / 2, PLACES), 2)
+    at = np.repeat(first, number)
     ways, count, misfit = _carried(problem, run, vector, at, tried.reshape(len(at), -1), horizon)
     misfit = np.where(np.isnan(misfit), np.inf, misfit).reshape(len(first), -1)
     for k, best in enumerate(np.argmin(misfit, axis=1)):
         if misfit[k, 0] > LOST_PIECE * max(1.0, misfit[k, best]):
-            way = k * (1 + PLACES) + best
+            way = k * number + best
             pieces = slice(first[k], first[k] + count[way])
             run.starts[pieces], run.slopes = ways[: count[way], way], None
 

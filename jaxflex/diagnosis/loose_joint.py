@@ -210,7 +210,7 @@ def without_contact(parameters: Parameters, candidate: Candidate) -> Freedom:
 def turned(search: Search, fitted: Hypothesis, joint: int, turns: int) -> Hypothesis:
     """Fitted again with the pieces that are lost begun at the flank that suits them, `turns` times while that helps."""
     for _ in range(turns):
-        if fitted.fit.level < CLOSE:
+        if fitted.fit.level < GONE:
             break
         starts = search.starts()
         choose_flanks(search.problem, search.runs, fitted.fit.vector, joint)

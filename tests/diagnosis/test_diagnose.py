@@ -36,9 +36,10 @@ def answer(folder):
 
 @pytest.fixture(scope="module")
 def hidden(tmp_path_factory):
-    """Two blind cases: a cable, nothing."""
+    """Two blind cases: a cable that leaves a gap of about ten, nothing."""
     folder = tmp_path_factory.mktemp("cases")
-    cases = make_cases("single_link", [("cable_stiffness",), ()], [10.0], [0])
+    cases = make_cases("single_link", [("cable_stiffness",), ()], [0.01], [0], typical=True)
+    assert 5.0 < cases[0].gap["size"] < 20.0
     for case in cases:
         write_case(case, folder / case.name)
     return {(case.truth[0][0] if case.truth else "nothing"): (folder / case.name, case) for case in cases}

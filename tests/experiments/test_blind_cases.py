@@ -74,7 +74,8 @@ def test_cases_are_as_asked(tmp_path, monkeypatch):
     assert {"rate_1 [rad/s]", "strain_1 [1]"} <= set(again.runs[0])
 
 
-def test_typical_sizes_are_of_effects_that_can_be_hidden():
+def test_typical_sizes_are_of_effects_that_can_be_hidden(monkeypatch):
+    monkeypatch.setattr("experiments.blind.make.FINE", COARSE)
     assert TYPICAL.keys() == EFFECTS.keys()
     (case,) = make_cases("single_link", [("coulomb_friction",)], [0.5], [0], typical=True)
     assert case.truth == (("coulomb_friction", "joint_1", {"torque": 0.5 * TYPICAL["coulomb_friction"]}),)
