@@ -38,7 +38,7 @@ GONE = 1.1  # misfit a reading, in units of the noise, that leaves nothing
 NEARLY = 0.05  # of the misfit beyond the noise: what the contact tried first may leave, that the other is not tried
 LESS = 0.5  # of the same: what a loose joint may leave to be gone on with
 TURNS = 3  # of trying the other flank and fitting again
-HELPS = 0.9  # of the cost: a turn that leaves more has not helped
+HELPS = 0.9  # of the cost beyond the noise: a turn that leaves more has not helped
 FIRST = 6  # iterations that tell sizes apart
 LIKELY = 0.75  # of a misfit beyond the noise: what a loose joint, its contact as guessed, may leave
 
@@ -215,7 +215,8 @@ def turned(search: Search, fitted: Hypothesis, joint: int, turns: int) -> Hypoth
         starts = search.starts()
         choose_flanks(search.problem, search.runs, fitted.fit.vector, joint)
         again = search.climb(fitted.effects, fitted.fit.vector, to=1, iterations=8)
-        if not again.fit.cost < HELPS * fitted.fit.cost:
+        noise = fitted.fit.count
+        if not again.fit.cost - noise < HELPS * (fitted.fit.cost - noise):
             search.restart(starts)
             break
         fitted = again
