@@ -12,6 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import jax
+
 import jaxflex as jf
 from jaxflex.diagnosis import diagnose
 
@@ -157,6 +159,7 @@ def main() -> None:
             result = {"case": folder.name, "error": repr(error)}
         with log.open("a") as stream:
             stream.write(json.dumps(result) + "\n")
+        jax.clear_caches()  # programs of some forty cases are more than one process may map
         print(
             json.dumps(
                 {k: result.get(k) for k in ("case", "verdict", "named", "alternatives", "right", "error")}
