@@ -13,8 +13,8 @@ from jaxflex.diagnosis.calibrate import held_back
 from jaxflex.diagnosis.catalogue import Candidate
 from jaxflex.diagnosis.flanks import PLACES, join_pieces
 from jaxflex.diagnosis.foretell import LOST, foretell
-from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis
-from jaxflex.diagnosis.loose_joint import FLANKS, best_from, first_gap, loosened
+from jaxflex.diagnosis.hypothesis import HORIZONS, Hypothesis, Search
+from jaxflex.diagnosis.loose_joint import FLANKS, TURNS, best_from, first_gap, loosened, turned
 from jaxflex.diagnosis.plant import hidden_loads, twist_place
 from jaxflex.diagnosis.prepare import HeldOut, make_problem
 from jaxflex.diagnosis.runs import starts_of
@@ -81,6 +81,38 @@ def test_a_load_at_rest_between_the_flanks_begins_where_those_after_it_say(study
     assert abs(run.starts[0, twist] - rest) < GAP / PLACES
     assert problem.misfit(run, problem.predict(run, vector))[:3].mean() < 0.1 * before.mean()
     np.testing.assert_allclose(run.starts[1:3, twist], true[1:, twist], atol=GAP / PLACES)
+    run.measured[0] = 0.0
+    run.starts[0] = 0.1  # bent by a fit over fewer pieces
+    join_pieces(problem, [run], vector, 3)
+    np.testing.assert_allclose(run.starts[0], true[0], atol=GAP / PLACES)
+
+
+@pytest.mark.parametrize(
+    "levels, kept",
+    [
+        ((1.29, 1.16, 0.96), 0.96),  # little of the whole, much of what is beyond the noise
+        ((1.29, 1.28, 0.96), 1.29),
+        ((1.05,), 1.05),
+        ((9.0, 5.0, 3.0, 2.0, 1.0), 2.0),  # three turns
+    ],
+)
+def test_the_other_flank_is_tried_while_that_takes_much_of_what_is_beyond_the_noise(
+    axis, monkeypatch, levels, kept
+):
+    settled = axis.search.settle(axis.search.parameters.start)
+
+    def fitted(level):
+        cost = level * settled.count
+        return Hypothesis((PLAY,), dataclasses.replace(settled, cost=cost, prior=0.0), 1, {1: cost})
+
+    class Turning(Search):
+        def climb(self, *args, **kwargs):
+            return next(coming)
+
+    coming = iter([fitted(level) for level in levels[1:]])
+    search = Turning(axis.search.problem, axis.search.runs, print)
+    monkeypatch.setattr("jaxflex.diagnosis.loose_joint.choose_flanks", lambda *args: None)
+    assert turned(search, fitted(levels[0]), 0, TURNS).fit.level == pytest.approx(kept)
 
 
 def test_pieces_are_taken_as_often_as_they_are_asked_for(study):
